@@ -1,0 +1,15 @@
+//! When do two things touch? One file a pair; every function is pure: states in, time out.
+
+mod sphere_plane;
+mod sphere_sphere;
+
+pub use sphere_plane::sphere_plane;
+pub use sphere_sphere::sphere_sphere;
+
+/// Approach speeds below this fraction of the speeds they are the difference of are rounding, not approach.
+///
+/// A normal speed is a difference of products and carries an error of a few units in the last place (2^-53) of the
+/// speeds themselves. Two touching things that "approach" slower than this have come to rest against each other
+/// (restitution 0, or a collapsed sequence of hits); to resolve such a contact again would never end. Consequence: in
+/// the time in which they move by a thousand radii they can sink into each other by at most 2e-12 radii.
+pub const APPROACH_ROUNDING: f64 = 1.0 / (1u64 << 49) as f64;

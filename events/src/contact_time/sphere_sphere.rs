@@ -1,0 +1,74 @@
+//! Sphere and sphere: Arbelaez, Zohdi & Dornfeld (2009), eq. (36) to (39).
+
+use nalgebra::Vector3;
+
+use super::APPROACH_ROUNDING;
+use crate::Flight;
+
+/// Time (s, epoch time) at which the spheres `a` and `b` touch, or `None` when they never do.
+///
+/// `shift` (m) is added to the position of `b`: the image of a periodic domain that is meant, zero elsewhere.
+///
+/// With r and v the relative position and velocity at the later of the two local times and s the sum of the radii,
+/// contact is at t = (r² - s²) / (-b + √G), b = r·v, G = s² v² - |r × v|². The paper prints (-b ± √G) / v², which
+/// cancels for distant and for touching pairs; this is the same root (the earlier one) without the cancellation, and the
+/// same holds of G against b² - v² (r² - s²).
+///
+/// Spheres that overlap and approach touch at once, those that overlap and recede do not (Bannerman et al. 2014): then no
+/// rounding can lose a collision or resolve one twice. The result is the same bit for bit when `a` and `b` change places
+/// (and `shift` its sign).
+///
+/// ```
+/// use impinge_events::{Flight, contact_time::sphere_sphere};
+/// use nalgebra::Vector3;
+///
+/// let a = Flight { position: Vector3::zeros(), time: 0.0, velocity: Vector3::x(), radius: 0.5 };
+/// let b = Flight { position: Vector3::new(3.0, 0.0, 0.0), velocity: -Vector3::x(), ..a };
+/// assert_eq!(sphere_sphere(&a, &b, Vector3::zeros()), Some(1.0));
+/// ```
+#[inline]
+#[must_use]
+pub fn sphere_sphere(a: &Flight, b: &Flight, shift: Vector3<f64>) -> Option<f64> {
+    let base = a.time.max(b.time);
+    let r = (b.position_at(base) - a.position_at(base)) + shift;
+    let v = b.velocity - a.velocity;
+    let approach = -r.dot(&v);
+    if approach > 0.0 {
+        let v2 = v.norm_squared();
+        if v2 >= SMALLEST_SPEED_SQUARED {
+            return meeting(a, b, r, v, approach, v2).map(|interval| base + interval);
+        }
+        return slow_meeting(a, b, r, v).map(|interval| base + interval);
+    }
+    None
+}
+
+/// Below this relative speed squared ((1e-140 m/s)²) the products of the root would underflow.
+const SMALLEST_SPEED_SQUARED: f64 = 1e-280;
+
+/// Interval until contact of a pair that approaches, s.
+#[inline]
+fn meeting(a: &Flight, b: &Flight, r: Vector3<f64>, v: Vector3<f64>, approach: f64, v2: f64) -> Option<f64> {
+    let s = a.radius + b.radius;
+    let reach = s * s * v2 - r.cross(&v).norm_squared();
+    if reach < 0.0 {
+        return None;
+    }
+    let separation = r.norm_squared() - s * s;
+    if separation > 0.0 {
+        return Some(separation / (approach + reach.sqrt()));
+    }
+    let speeds = a.velocity.amax() + b.velocity.amax();
+    (approach > APPROACH_ROUNDING * speeds * s).then_some(0.0)
+}
+
+/// The same for grains so slow that squares of their speeds underflow, as at the end of a collapse: in units of time in which
+/// their speeds are near 1. The unit is a power of two, so nothing is rounded.
+#[cold]
+fn slow_meeting(a: &Flight, b: &Flight, r: Vector3<f64>, v: Vector3<f64>) -> Option<f64> {
+    let fastest = a.velocity.amax().max(b.velocity.amax());
+    let unit = 2f64.powi(fastest.log2().floor().clamp(-960.0, 0.0) as i32);
+    let scaled = |flight: &Flight| Flight { velocity: flight.velocity / unit, ..*flight };
+    let v = v / unit;
+    meeting(&scaled(a), &scaled(b), r, v, -r.dot(&v), v.norm_squared()).map(|interval| interval / unit)
+}

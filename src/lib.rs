@@ -1,0 +1,4 @@
+//! Impinge
+pub mod grains;
+pub mod scene;
+pub mod scheme;

@@ -1,0 +1,121 @@
+//! Ways to advance time, and what each of them reports to its observers.
+
+use nalgebra::Vector3;
+
+use crate::grains::{Grain, Snapshot};
+use impinge_events::Flight;
+
+/// A collision between two grains, as observers see it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GrainCollision {
+    /// Simulated time, s.
+    pub time: f64,
+    /// Ids of the two grains, the lower one first.
+    pub ids: [u64; 2],
+    /// Contact point, m.
+    pub position: Vector3<f64>,
+    /// Unit contact normal, from the first grain to the second.
+    pub normal: Vector3<f64>,
+    /// Normal impulse J_n, N s; it pushes the two apart.
+    pub impulse_normal: f64,
+    /// Magnitude of the tangential impulse J_t, N s.
+    pub impulse_tangential: f64,
+    /// Normal speed of approach before the collision, m/s.
+    pub approach_speed: f64,
+    /// Kinetic energy dissipated, J.
+    pub dissipated: f64,
+    /// Overlap at the event over the smaller radius: what rounding left (negative: a gap).
+    pub overlap_over_radius: f64,
+}
+
+/// A collision between a grain and the surface, as observers see it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceHit {
+    /// Simulated time, s.
+    pub time: f64,
+    /// Id of the grain.
+    pub id: u64,
+    /// Number of the plane or triangle, counted over all surfaces in the order of the scene.
+    pub element: u32,
+    /// Contact point, m.
+    pub position: Vector3<f64>,
+    /// Unit contact normal, from the surface to the grain.
+    pub normal: Vector3<f64>,
+    /// Hit order: 1 for the first time this grain hits the surface.
+    pub order: u32,
+    /// Normal impulse J_n on the grain along `normal`, N s.
+    pub impulse_normal: f64,
+    /// Tangential impulse on the grain, N s.
+    pub impulse_tangential: Vector3<f64>,
+    /// Normal speed of approach before the hit, relative to the surface, m/s.
+    pub approach_speed: f64,
+    /// Kinetic energy that the grain brings to the surface, relative to the surface: ½ m v_n², J.
+    pub energy_normal: f64,
+    /// The same along the surface: ½ m v_t², J.
+    pub energy_tangential: f64,
+    /// The same in its rotation: ½ I ω², J.
+    pub energy_spin: f64,
+    /// Kinetic energy dissipated, J.
+    pub dissipated: f64,
+    /// Work that a moving surface does on the grain, J; 0 for one at rest.
+    pub work: f64,
+    /// Overlap at the event over the radius: what rounding left (negative: a gap).
+    pub overlap_over_radius: f64,
+}
+
+impl SurfaceHit {
+    /// Kinetic energy that the grain brings to the surface (J): normal, tangential and rotational.
+    #[must_use]
+    pub fn energy(&self) -> f64 {
+        self.energy_normal + self.energy_tangential + self.energy_spin
+    }
+}
+
+/// How a grain came in or went out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Passage {
+    /// It entered from a source.
+    Entered,
+    /// Its centre left the domain.
+    Left,
+    /// It was taken out by `interference = "removed-on-first-collision"`.
+    Removed,
+}
+
+/// What watches a run. Every method has an empty default, so an observer costs only what it asks for.
+pub trait Observer {
+    /// Two grains collided.
+    fn grain_collision(&mut self, _collision: &GrainCollision) {}
+    /// A grain hit the surface.
+    fn surface_hit(&mut self, _hit: &SurfaceHit) {}
+    /// A grain entered, left or was removed at `time` (s). The flight stands at that moment.
+    fn passage(&mut self, _passage: Passage, _time: f64, _flight: &Flight, _grain: &Grain) {}
+    /// A regular sample of all grains: the first at the start, the last at the end of the run.
+    fn sample(&mut self, _snapshot: &Snapshot<'_>) {}
+}
+
+/// Nobody watches.
+impl Observer for () {}
+
+/// Two observers watch.
+impl<A: Observer, B: Observer> Observer for (A, B) {
+    fn grain_collision(&mut self, collision: &GrainCollision) {
+        self.0.grain_collision(collision);
+        self.1.grain_collision(collision);
+    }
+
+    fn surface_hit(&mut self, hit: &SurfaceHit) {
+        self.0.surface_hit(hit);
+        self.1.surface_hit(hit);
+    }
+
+    fn passage(&mut self, passage: Passage, time: f64, flight: &Flight, grain: &Grain) {
+        self.0.passage(passage, time, flight, grain);
+        self.1.passage(passage, time, flight, grain);
+    }
+
+    fn sample(&mut self, snapshot: &Snapshot<'_>) {
+        self.0.sample(snapshot);
+        self.1.sample(snapshot);
+    }
+}
