@@ -90,8 +90,10 @@ pub trait Observer {
     fn surface_hit(&mut self, _hit: &SurfaceHit) {}
     /// A grain entered, left or was removed at `time` (s). The flight stands at that moment.
     fn passage(&mut self, _passage: Passage, _time: f64, _flight: &Flight, _grain: &Grain) {}
-    /// A regular sample of all grains: the first at the start, the last at the end of the run.
+    /// A regular sample for time histories: the first at the start, the last at the end of the run.
     fn sample(&mut self, _snapshot: &Snapshot<'_>) {}
+    /// A regular sample for pictures and ParaView, `number` counting from 0; as many as the scene asks for.
+    fn frame(&mut self, _number: u32, _snapshot: &Snapshot<'_>) {}
 }
 
 /// Nobody watches.
@@ -117,5 +119,10 @@ impl<A: Observer, B: Observer> Observer for (A, B) {
     fn sample(&mut self, snapshot: &Snapshot<'_>) {
         self.0.sample(snapshot);
         self.1.sample(snapshot);
+    }
+
+    fn frame(&mut self, number: u32, snapshot: &Snapshot<'_>) {
+        self.0.frame(number, snapshot);
+        self.1.frame(number, snapshot);
     }
 }
