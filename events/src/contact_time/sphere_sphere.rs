@@ -54,12 +54,12 @@ fn meeting(a: &Flight, b: &Flight, r: Vector3<f64>, v: Vector3<f64>, approach: f
     if reach < 0.0 {
         return None;
     }
-    let separation = r.norm_squared() - s * s;
-    if separation > 0.0 {
-        return Some(separation / (approach + reach.sqrt()));
-    }
     let speeds = a.velocity.amax() + b.velocity.amax();
-    (approach > APPROACH_ROUNDING * speeds * s).then_some(0.0)
+    if approach <= APPROACH_ROUNDING * speeds * s {
+        return None;
+    }
+    let separation = r.norm_squared() - s * s;
+    Some(separation.max(0.0) / (approach + reach.sqrt()))
 }
 
 /// The same for grains so slow that squares of their speeds underflow, as at the end of a collapse: in units of time in which

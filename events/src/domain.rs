@@ -1,0 +1,68 @@
+//! The region in which grains are followed.
+
+use nalgebra::Vector3;
+
+use crate::Flight;
+
+/// The region in which grains are followed.
+///
+/// In a planar domain nothing ever happens along y: all positions and velocities have y = 0, and the domain has no sides
+/// there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Domain {
+    /// Lower corner, m.
+    pub min: Vector3<f64>,
+    /// Upper corner, m.
+    pub max: Vector3<f64>,
+    /// Whether what leaves on one side comes in on the other.
+    pub periodic: bool,
+    /// Whether the scene lies in the plane y = 0.
+    pub planar: bool,
+}
+
+impl Domain {
+    /// A domain without sides.
+    #[must_use]
+    pub fn unbounded() -> Self {
+        let far = Vector3::repeat(f64::INFINITY);
+        Self { min: -far, max: far, periodic: false, planar: false }
+    }
+
+    /// The axes along which grains move.
+    pub(crate) fn axes(&self) -> &'static [usize] {
+        if self.planar { &[0, 2] } else { &[0, 1, 2] }
+    }
+
+    /// Lengths of the sides, m.
+    #[must_use]
+    pub fn extent(&self) -> Vector3<f64> {
+        self.max - self.min
+    }
+
+    /// When the centre of `flight` leaves an open domain (s, epoch time); infinity when it never does.
+    pub(crate) fn exit_time(&self, flight: &Flight) -> f64 {
+        let mut exit = f64::INFINITY;
+        if !self.periodic {
+            for &axis in self.axes() {
+                let (x, v) = (flight.position[axis], flight.velocity[axis]);
+                let side = if v > 0.0 { self.max[axis] } else { self.min[axis] };
+                // A grain at rest along this axis gives 0/0 or x/0: neither is less than anything.
+                let time = flight.time + ((side - x) / v).max(0.0);
+                if v != 0.0 && time < exit {
+                    exit = time;
+                }
+            }
+        }
+        exit
+    }
+
+    /// Moves `position` into a periodic domain; elsewhere nothing happens.
+    pub(crate) fn wrap(&self, position: &mut Vector3<f64>) {
+        if self.periodic {
+            for &axis in self.axes() {
+                let length = self.max[axis] - self.min[axis];
+                position[axis] -= ((position[axis] - self.min[axis]) / length).floor() * length;
+            }
+        }
+    }
+}

@@ -1,0 +1,455 @@
+//! Flights, surface, neighbours and calendar put together: who meets whom next?
+
+use nalgebra::Vector3;
+
+use crate::calendar::{Calendar, Event, Kind, Tournament};
+use crate::contact_time::sphere_sphere;
+use crate::neighbors::Cells;
+use crate::{Domain, Flight, NoSurface, Outlook, Surface};
+
+/// What happens next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encounter {
+    /// Two grains touch.
+    Grains {
+        /// The lower number.
+        a: u32,
+        /// The higher number.
+        b: u32,
+    },
+    /// A grain touches the surface.
+    Surface {
+        /// The grain.
+        grain: u32,
+        /// Which plane or triangle.
+        element: u32,
+    },
+    /// The centre of a grain reaches a side of the open domain.
+    Exit {
+        /// The grain.
+        grain: u32,
+    },
+}
+
+/// No partner.
+const NOBODY: u32 = u32::MAX;
+
+/// The earliest of each sort of event that lies before a grain.
+#[derive(Clone, Copy, Debug)]
+struct Plan {
+    /// With another grain ([`Kind::Grains`]) or, where that grain has been deflected meanwhile, a new look ([`Kind::Review`]).
+    pair: Event,
+    /// With the surface or a side of the domain.
+    side: Event,
+    /// Out of its cell, along the axis `partner`.
+    crossing: Event,
+    /// Whether the surface stops this grain.
+    stopped_by_surface: bool,
+}
+
+const fn never(kind: Kind) -> Event {
+    Event { time: f64::INFINITY, kind, partner: NOBODY }
+}
+
+const NO_PLAN: Plan = Plan {
+    pair: never(Kind::Review),
+    side: never(Kind::Exit),
+    crossing: never(Kind::Crossing),
+    stopped_by_surface: true,
+};
+
+impl Plan {
+    #[inline]
+    fn first(&self, owner: u32) -> Event {
+        let earlier = |a: Event, b: Event| if b.order(owner, &a, owner).is_lt() { b } else { a };
+        earlier(self.pair, earlier(self.side, self.crossing))
+    }
+}
+
+/// Grains in free flight, and the order in which they meet each other and the surface.
+///
+/// [`next_before`](Self::next_before) gives the next encounter with its grains advanced to it; the caller decides what it does to
+/// their velocities and says so with [`deflect`](Self::deflect). Each grain keeps its own local time, and its stored state changes only
+/// when its motion does; so which neighbours were looked at, which calendar was used and how often somebody looked cannot
+/// change a bit of what happens.
+///
+/// Times are seconds since the start of the current epoch. [`start_epoch`](Self::start_epoch) advances all grains to a common
+/// moment and counts from there, so that resolution in time does not fade in long runs.
+///
+/// ```
+/// use impinge_events::{Domain, Encounter, Encounters, Flight, NoSurface};
+/// use nalgebra::Vector3;
+///
+/// let ball = |x: f64, vx: f64| Flight { position: Vector3::new(x, 0.0, 0.0), time: 0.0, velocity: Vector3::new(vx, 0.0, 0.0), radius: 0.5 };
+/// let mut balls = Encounters::<NoSurface>::new(vec![ball(0.0, 1.0), ball(3.0, 0.0)], NoSurface, Domain::unbounded());
+/// assert_eq!(balls.next_before(10.0), Some((2.0, Encounter::Grains { a: 0, b: 1 })));
+/// // Equal elastic balls exchange their velocities.
+/// balls.deflect(&[(0, Vector3::zeros()), (1, Vector3::x())]);
+/// assert_eq!(balls.next_before(10.0), None);
+/// assert_eq!(balls.flight(1).position_at(4.0).x, 5.0);
+/// ```
+#[derive(Clone, Debug)]
+pub struct Encounters<S: Surface = NoSurface, C: Calendar = Tournament> {
+    flights: Vec<Flight>,
+    plans: Vec<Plan>,
+    /// Absent where grains pass through each other.
+    cells: Option<Cells>,
+    calendar: C,
+    surface: S,
+    domain: Domain,
+    /// Numbers of grains that have been taken out, free for new ones.
+    vacant: Vec<u32>,
+    /// End of the epoch: nothing beyond it is scheduled.
+    horizon: f64,
+}
+
+impl<S: Surface, C: Calendar> Encounters<S, C> {
+    /// Grains that meet each other, `surface` and the sides of `domain`. Their local times count from the start of the first epoch.
+    ///
+    /// # Panics
+    /// Where a periodic domain is too small for the grains ([`Domain::holds`]).
+    #[must_use]
+    pub fn new(flights: Vec<Flight>, surface: S, domain: Domain) -> Self {
+        let mut encounters = Self::without_pairs(flights, surface, domain);
+        encounters.lay_out_cells();
+        encounters.predict_all();
+        encounters
+    }
+
+    /// Grains that pass through each other and meet only `surface` and the sides of `domain`.
+    #[must_use]
+    pub fn transparent(flights: Vec<Flight>, surface: S, domain: Domain) -> Self {
+        let mut encounters = Self::without_pairs(flights, surface, domain);
+        encounters.predict_all();
+        encounters
+    }
+
+    fn without_pairs(flights: Vec<Flight>, surface: S, domain: Domain) -> Self {
+        let mut calendar = C::default();
+        calendar.reserve(flights.len());
+        let plans = vec![NO_PLAN; flights.len()];
+        Self { flights, plans, cells: None, calendar, surface, domain, vacant: Vec::new(), horizon: f64::INFINITY }
+    }
+
+    /// The state of a grain, at its own local time.
+    #[inline]
+    #[must_use]
+    pub fn flight(&self, grain: u32) -> &Flight {
+        &self.flights[grain as usize]
+    }
+
+    /// The numbers of all grains that are inside, in ascending order.
+    pub fn inside(&self) -> impl Iterator<Item = u32> + '_ {
+        (0..self.flights.len() as u32).filter(|&grain| !is_vacant(&self.flights[grain as usize]))
+    }
+
+    /// How many grains are inside.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.flights.len() - self.vacant.len()
+    }
+
+    /// What the grains can hit.
+    #[must_use]
+    pub fn surface(&self) -> &S {
+        &self.surface
+    }
+
+    /// The next encounter at or before `end` (s, epoch time) and its time, or `None`. Its grains have been advanced to that time; the
+    /// caller now resolves it and calls [`deflect`](Self::deflect) or [`remove`](Self::remove) for each of them.
+    pub fn next_before(&mut self, end: f64) -> Option<(f64, Encounter)> {
+        loop {
+            let (owner, event) = self.calendar.next()?;
+            if event.time > end {
+                return None;
+            }
+            match event.kind {
+                Kind::Crossing => self.cross(owner),
+                Kind::Review => {
+                    self.plans[owner as usize].pair = never(Kind::Review);
+                    self.find_partner(owner);
+                    self.reschedule(owner);
+                }
+                Kind::Grains => {
+                    let (a, b) = (owner.min(event.partner), owner.max(event.partner));
+                    self.advance(a, event.time);
+                    self.advance(b, event.time);
+                    return Some((event.time, Encounter::Grains { a, b }));
+                }
+                Kind::Surface => {
+                    self.advance(owner, event.time);
+                    return Some((event.time, Encounter::Surface { grain: owner, element: event.partner }));
+                }
+                Kind::Exit => {
+                    self.advance(owner, event.time);
+                    return Some((event.time, Encounter::Exit { grain: owner }));
+                }
+            }
+        }
+    }
+
+    /// Gives grains that have just met something their new velocities (m/s) and predicts what lies before them now.
+    pub fn deflect(&mut self, grains: &[(u32, Vector3<f64>)]) {
+        for &(grain, velocity) in grains {
+            self.flights[grain as usize].velocity = velocity;
+            self.release_partner(grain);
+        }
+        for &(grain, _) in grains {
+            self.predict(grain);
+        }
+    }
+
+    /// Lets a grain pass through the surface from now on. Takes effect when it is next deflected.
+    pub fn pass_through_surface(&mut self, grain: u32) {
+        self.plans[grain as usize].stopped_by_surface = false;
+    }
+
+    /// Takes a grain in and gives its number. Numbers of grains that have been removed are used again.
+    pub fn insert(&mut self, flight: Flight) -> u32 {
+        let grain = self.vacant.pop().unwrap_or(self.flights.len() as u32);
+        if grain as usize == self.flights.len() {
+            self.flights.push(flight);
+            self.plans.push(NO_PLAN);
+        } else {
+            self.flights[grain as usize] = flight;
+            self.plans[grain as usize] = NO_PLAN;
+        }
+        match &mut self.cells {
+            Some(cells) if !cells.fits(flight.radius) || cells.crowded(self.flights.len()) => {
+                self.lay_out_cells();
+                self.predict_all();
+            }
+            cells => {
+                if let Some(cells) = cells {
+                    cells.insert(grain, &flight);
+                }
+                self.predict(grain);
+            }
+        }
+        grain
+    }
+
+    /// Takes a grain out.
+    pub fn remove(&mut self, grain: u32) {
+        self.release_partner(grain);
+        self.calendar.cancel(grain);
+        if let Some(cells) = &mut self.cells {
+            cells.remove(grain);
+        }
+        self.flights[grain as usize] = VACANT;
+        self.plans[grain as usize] = NO_PLAN;
+        self.vacant.push(grain);
+    }
+
+    /// Whether a sphere at `position` with this `radius` (m) overlaps no grain at `time`.
+    #[must_use]
+    pub fn is_free(&self, position: Vector3<f64>, radius: f64, time: f64) -> bool {
+        let mut free = true;
+        if let Some(cells) = &self.cells {
+            if !cells.fits(radius) {
+                let far = |grain| {
+                    self.flight(grain).radius + radius < (self.flight(grain).position_at(time) - position).norm()
+                };
+                return self.inside().all(far);
+            }
+            cells.visit_near(position, time, |other, shift| {
+                let other = self.flight(other);
+                let distance = (other.position_at(time) + shift - position).norm();
+                free &= distance >= other.radius + radius;
+            });
+        }
+        free
+    }
+
+    /// Starts a new epoch `duration` seconds after the start of the current one: advances all grains to that moment, which is time 0
+    /// from then on, and schedules nothing later than `next` seconds after it.
+    ///
+    /// `next_before(duration)` must have given `None`.
+    pub fn start_epoch(&mut self, duration: f64, next: f64) {
+        self.horizon = next;
+        self.surface.start_epoch(duration);
+        for grain in 0..self.flights.len() as u32 {
+            let flight = &mut self.flights[grain as usize];
+            if !is_vacant(flight) {
+                *flight = flight.advanced_to(duration);
+                flight.time = 0.0;
+                self.domain.wrap(&mut flight.position);
+            }
+        }
+        if self.cells.is_some() {
+            self.lay_out_cells();
+        }
+        self.predict_all();
+    }
+
+    fn lay_out_cells(&mut self) {
+        let inside = || self.flights.iter().filter(|flight| !is_vacant(flight));
+        let largest = inside().map(|flight| flight.radius).fold(0.0, f64::max);
+        let mut cells = Cells::new(self.domain, largest, inside());
+        assert!(
+            cells.fits(largest),
+            "a periodic domain must be at least {} grains wide",
+            2 * crate::neighbors::FEWEST_PERIODIC_CELLS
+        );
+        for grain in self.inside() {
+            cells.insert(grain, self.flight(grain));
+        }
+        self.cells = Some(cells);
+    }
+
+    fn predict_all(&mut self) {
+        for grain in 0..self.flights.len() {
+            self.plans[grain].pair = never(Kind::Review);
+        }
+        for grain in self.inside().collect::<Vec<_>>() {
+            self.predict(grain);
+        }
+    }
+
+    /// Moves the state of a grain to `time`.
+    #[inline]
+    fn advance(&mut self, grain: u32, time: f64) {
+        let flight = &mut self.flights[grain as usize];
+        *flight = flight.advanced_to(time);
+        if self.domain.periodic {
+            let before = flight.position;
+            self.domain.wrap(&mut flight.position);
+            if let Some(cells) = &mut self.cells {
+                cells.wrapped(grain, flight.position - before);
+            }
+        }
+    }
+
+    /// Predicts everything that lies before a grain whose motion has changed.
+    fn predict(&mut self, grain: u32) {
+        let crossing = self.crossing(grain);
+        let side = self.side(grain, crossing.time.min(self.horizon));
+        let plan = &mut self.plans[grain as usize];
+        (plan.crossing, plan.side) = (crossing, side);
+        self.find_partner(grain);
+        self.reschedule(grain);
+    }
+
+    /// When a grain leaves its cell.
+    #[inline]
+    fn crossing(&self, grain: u32) -> Event {
+        match &self.cells {
+            Some(cells) => {
+                let crossing = cells.crossing(grain, self.flight(grain));
+                Event { time: crossing.time, kind: Kind::Crossing, partner: u32::from(crossing.axis) }
+            }
+            None => never(Kind::Crossing),
+        }
+    }
+
+    /// When a grain hits the surface or leaves the domain, as far as can be seen until `until`.
+    #[inline]
+    fn side(&self, grain: u32, until: f64) -> Event {
+        let flight = self.flight(grain);
+        let plan = &self.plans[grain as usize];
+        let exit = Event { time: self.domain.exit_time(flight), kind: Kind::Exit, partner: NOBODY };
+        if plan.stopped_by_surface
+            && let Outlook::Hit { time, element } = self.surface.first_contact(flight, until)
+            && time <= exit.time
+        {
+            return Event { time, kind: Kind::Surface, partner: element };
+        }
+        exit
+    }
+
+    /// Finds the first grain that this one meets, among all that are near.
+    #[inline]
+    fn find_partner(&mut self, grain: u32) {
+        let Some(cells) = &self.cells else { return };
+        let mut best = self.plans[grain as usize].pair;
+        cells.visit_around(grain, |other, shift| self.consider(grain, other, shift, &mut best));
+        self.plan_pair(grain, best);
+    }
+
+    /// Takes the meeting of `grain` with `other` for `best` if it comes before all that either of them has planned.
+    ///
+    /// What `other` has planned earlier will deflect it, and then it looks for itself; so does whoever it leaves.
+    #[inline]
+    fn consider(&self, grain: u32, other: u32, shift: Vector3<f64>, best: &mut Event) {
+        let Some(time) = sphere_sphere(self.flight(grain), self.flight(other), shift) else { return };
+        if time > best.time || time > self.horizon {
+            return;
+        }
+        let (mine, theirs) = (&self.plans[grain as usize], &self.plans[other as usize]);
+        let event = Event { time, kind: Kind::Grains, partner: other };
+        if event.order(grain, best, grain).is_lt()
+            && event.order(grain, &theirs.pair, other).is_lt()
+            && event.order(grain, &mine.side, grain).is_lt()
+            && event.order(grain, &theirs.side, other).is_lt()
+        {
+            *best = event;
+        }
+    }
+
+    /// Puts a meeting into the plans of both grains, and leaves the one that `grain` or its new partner had in mind before.
+    fn plan_pair(&mut self, grain: u32, event: Event) {
+        if event.kind != Kind::Grains || event == self.plans[grain as usize].pair {
+            return;
+        }
+        let other = event.partner;
+        self.release_partner(grain);
+        self.release_partner(other);
+        self.plans[grain as usize].pair = event;
+        self.plans[other as usize].pair = Event { partner: grain, ..event };
+        self.reschedule(other);
+    }
+
+    /// Dissolves the planned meeting of a grain. The partner looks again when they would have met: until then nothing else happens to
+    /// it, or it would have been planned instead.
+    fn release_partner(&mut self, grain: u32) {
+        let event = std::mem::replace(&mut self.plans[grain as usize].pair, never(Kind::Review));
+        if event.kind == Kind::Grains {
+            self.plans[event.partner as usize].pair = Event { kind: Kind::Review, partner: 0, ..event };
+            self.reschedule(event.partner);
+        }
+    }
+
+    /// Moves a grain into the next cell and looks at the neighbours that it has there.
+    fn cross(&mut self, grain: u32) {
+        let plan = self.plans[grain as usize];
+        let flight = self.flights[grain as usize];
+        let mut best = plan.pair;
+        // The grid is taken out while it hands its neighbours to `self`.
+        let mut cells = self.cells.take();
+        if let Some(cells) = &mut cells {
+            let axis = plan.crossing.partner as u8;
+            cells.cross(grain, &flight, axis, |other, shift| self.consider(grain, other, shift, &mut best));
+        }
+        self.cells = cells;
+        let crossing = self.crossing(grain);
+        self.plans[grain as usize].crossing = crossing;
+        if plan.side.kind != Kind::Surface {
+            self.plans[grain as usize].side = self.side(grain, crossing.time.min(self.horizon));
+        }
+        self.plan_pair(grain, best);
+        self.reschedule(grain);
+    }
+
+    #[inline]
+    fn reschedule(&mut self, grain: u32) {
+        let first = self.plans[grain as usize].first(grain);
+        if first.time > self.horizon {
+            self.calendar.cancel(grain);
+        } else {
+            self.calendar.schedule(grain, first);
+        }
+    }
+}
+
+/// Stands where a grain has been taken out.
+const VACANT: Flight = Flight {
+    position: Vector3::new(f64::NAN, f64::NAN, f64::NAN),
+    time: 0.0,
+    velocity: Vector3::new(0.0, 0.0, 0.0),
+    radius: 0.0,
+};
+
+#[inline]
+fn is_vacant(flight: &Flight) -> bool {
+    flight.radius == 0.0
+}

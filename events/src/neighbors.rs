@@ -1,0 +1,278 @@
+//! Who can meet whom before when: cells that drift with the stream.
+//!
+//! A grain can only touch grains in its own cell and the cells around it until it leaves its cell. The grid of cells moves at
+//! a constant velocity, so grains that fly side by side at that velocity never cross a cell. The grid has no bounds: cell
+//! k along an axis is kept in slot k modulo the number of slots, so memory follows the grains and not the domain. Two far
+//! cells may share a slot; their grains are then looked at for nothing, but never missed. In a periodic domain the slots
+//! tile the period, and the same modulus is the periodic image.
+//!
+//! Cells are bookkeeping: neither their size nor their drift can change a bit of a prediction.
+
+use nalgebra::Vector3;
+
+use crate::{Domain, Flight};
+
+/// A cell is wider than the largest contact distance by this fraction, so that a crossing that is late by rounding cannot
+/// hide a contact; the position of a grain is known to about 1e-16 of its distance from the origin.
+const CELL_MARGIN: f64 = 1e-6;
+/// Fewest slots along an axis of an open domain: with three, a cell and its two neighbours are different slots.
+const FEWEST_SLOTS: i32 = 3;
+/// Fewest cells along an axis of a periodic domain. With four, two grains in adjacent cells have one nearest image.
+pub(crate) const FEWEST_PERIODIC_CELLS: i32 = 4;
+/// Cells for each grain, about: more cost memory, fewer are shared by far cells.
+const SLOTS_PER_GRAIN: usize = 4;
+const NOBODY: u32 = u32::MAX;
+
+/// Where a grain stands in the grid.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    /// Cell along each axis; counts on beyond the slots and beyond the period.
+    cell: Vector3<i32>,
+    next: u32,
+    previous: u32,
+}
+
+const NOWHERE: Place = Place { cell: Vector3::new(0, 0, 0), next: NOBODY, previous: NOBODY };
+
+/// A crossing: when, and into which cell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Crossing {
+    pub(crate) time: f64,
+    /// 0, 1 or 2.
+    pub(crate) axis: u8,
+}
+
+/// The grid.
+#[derive(Clone, Debug)]
+pub(crate) struct Cells {
+    size: Vector3<f64>,
+    slots: Vector3<i32>,
+    /// Corner of cell (0, 0, 0) at epoch time 0, m.
+    corner: Vector3<f64>,
+    drift: Vector3<f64>,
+    domain: Domain,
+    heads: Vec<u32>,
+    places: Vec<Place>,
+}
+
+impl Cells {
+    /// An empty grid for grains of radius `largest_radius` at most, laid out for `flights`.
+    pub(crate) fn new<'a>(
+        domain: Domain,
+        largest_radius: f64,
+        flights: impl Iterator<Item = &'a Flight> + Clone,
+    ) -> Self {
+        let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+        let (mut momentum, mut count) = (Vector3::zeros(), 0usize);
+        for flight in flights {
+            let start = flight.position_at(0.0);
+            (low, high) = (low.inf(&start), high.sup(&start));
+            momentum += flight.velocity;
+            count += 1;
+        }
+        if count == 0 {
+            (low, high) = (Vector3::zeros(), Vector3::zeros());
+        }
+        let slots_wanted = (SLOTS_PER_GRAIN * count).max(64) as f64;
+        let axes = domain.axes();
+        let contact = 2.0 * largest_radius * (1.0 + CELL_MARGIN);
+        let (mut size, mut slots) = (Vector3::repeat(contact), Vector3::repeat(1));
+        let drift = if domain.periodic || count == 0 { Vector3::zeros() } else { momentum / count as f64 };
+        if domain.periodic {
+            (low, high) = (domain.min, domain.max);
+        }
+        let extent = |axis: usize| (high[axis] - low[axis]).max(contact);
+        // Cells of the size of a contact where grains are dense, larger ones where that would leave most of them empty.
+        let volume: f64 = axes.iter().map(|&axis| extent(axis)).product();
+        let width = contact.max((volume / slots_wanted).powf(1.0 / axes.len() as f64));
+        for &axis in axes {
+            let cells = (extent(axis) / width).floor().clamp(1.0, 1e6) as i32;
+            if domain.periodic {
+                slots[axis] = cells.max(FEWEST_PERIODIC_CELLS);
+                size[axis] = extent(axis) / f64::from(slots[axis]);
+            } else {
+                slots[axis] = cells.max(FEWEST_SLOTS);
+                size[axis] = width;
+            }
+        }
+        let heads = vec![NOBODY; slots.iter().map(|&n| n as usize).product()];
+        Self { size, slots, corner: low, drift, domain, heads, places: Vec::new() }
+    }
+
+    /// Whether grains of this radius fit the cells.
+    pub(crate) fn fits(&self, radius: f64) -> bool {
+        self.domain.axes().iter().all(|&axis| 2.0 * radius * (1.0 + CELL_MARGIN) <= self.size[axis])
+    }
+
+    /// Whether so many grains would crowd the slots.
+    pub(crate) fn crowded(&self, grains: usize) -> bool {
+        grains > self.heads.len()
+    }
+
+    /// Position relative to the corner of the grid, in the frame that drifts with it.
+    fn relative(&self, position: Vector3<f64>, time: f64) -> Vector3<f64> {
+        position - (self.corner + self.drift * time)
+    }
+
+    fn cell_of(&self, position: Vector3<f64>, time: f64) -> Vector3<i32> {
+        let mut cell = self.relative(position, time).component_div(&self.size).map(|x| x.floor() as i32);
+        if self.domain.planar {
+            cell.y = 0;
+        }
+        cell
+    }
+
+    fn slot(&self, cell: Vector3<i32>) -> usize {
+        let at = |axis: usize| cell[axis].rem_euclid(self.slots[axis]) as usize;
+        at(0) + self.slots.x as usize * (at(1) + self.slots.y as usize * at(2))
+    }
+
+    /// Puts grain `id` into the cell where it is at its local time.
+    pub(crate) fn insert(&mut self, id: u32, flight: &Flight) {
+        if self.places.len() <= id as usize {
+            self.places.resize(id as usize + 1, NOWHERE);
+        }
+        self.places[id as usize].cell = self.cell_of(flight.position, flight.time);
+        self.link(id);
+    }
+
+    fn link(&mut self, id: u32) {
+        let slot = self.slot(self.places[id as usize].cell);
+        let first = std::mem::replace(&mut self.heads[slot], id);
+        self.places[id as usize].next = first;
+        self.places[id as usize].previous = NOBODY;
+        if first != NOBODY {
+            self.places[first as usize].previous = id;
+        }
+    }
+
+    /// Takes grain `id` out.
+    pub(crate) fn remove(&mut self, id: u32) {
+        let Place { cell, next, previous } = self.places[id as usize];
+        if previous == NOBODY {
+            let slot = self.slot(cell);
+            self.heads[slot] = next;
+        } else {
+            self.places[previous as usize].next = next;
+        }
+        if next != NOBODY {
+            self.places[next as usize].previous = previous;
+        }
+    }
+
+    /// Tells the grid that a periodic wrap has moved the stored position of `id` by `shift`.
+    pub(crate) fn wrapped(&mut self, id: u32, shift: Vector3<f64>) {
+        let periods = shift.component_div(&self.domain.extent()).map(|x| x.round() as i32);
+        self.places[id as usize].cell += periods.component_mul(&self.slots);
+    }
+
+    /// When and through which side `flight` leaves its cell.
+    pub(crate) fn crossing(&self, id: u32, flight: &Flight) -> Crossing {
+        let cell = self.places[id as usize].cell;
+        let y = self.relative(flight.position, flight.time);
+        let v = flight.velocity - self.drift;
+        let mut first = Crossing { time: f64::INFINITY, axis: 0 };
+        for &axis in self.domain.axes() {
+            if v[axis] != 0.0 {
+                let side = f64::from(cell[axis] + i32::from(v[axis] > 0.0)) * self.size[axis];
+                let time = flight.time + (side - y[axis]) / v[axis];
+                if time < first.time {
+                    first = Crossing { time, axis: axis as u8 };
+                }
+            }
+        }
+        first
+    }
+
+    /// Moves grain `id` into the next cell along `axis`, and calls `visit` with every grain in the cells that have become adjacent.
+    pub(crate) fn cross(&mut self, id: u32, flight: &Flight, axis: u8, visit: impl FnMut(u32, Vector3<f64>)) {
+        let axis = usize::from(axis);
+        let step = if flight.velocity[axis] > self.drift[axis] { 1 } else { -1 };
+        self.remove(id);
+        self.places[id as usize].cell[axis] += step;
+        self.link(id);
+        let (mut from, mut to) = self.all_around();
+        (from[axis], to[axis]) = (step, step);
+        self.visit_others(id, from, to, visit);
+    }
+
+    /// Calls `visit` with every grain in the cells around grain `id`, itself left out, and with the shift (m) of the periodic
+    /// image that is near.
+    #[inline]
+    pub(crate) fn visit_around(&self, id: u32, visit: impl FnMut(u32, Vector3<f64>)) {
+        let (from, to) = self.all_around();
+        self.visit_others(id, from, to, visit);
+    }
+
+    fn all_around(&self) -> (Vector3<i32>, Vector3<i32>) {
+        let deep = i32::from(!self.domain.planar);
+        (Vector3::new(-1, -deep, -1), Vector3::new(1, deep, 1))
+    }
+
+    #[inline]
+    fn visit_others(&self, id: u32, from: Vector3<i32>, to: Vector3<i32>, mut visit: impl FnMut(u32, Vector3<f64>)) {
+        self.visit_cells(self.places[id as usize].cell, from, to, |other, shift| {
+            if other != id {
+                visit(other, shift);
+            }
+        });
+    }
+
+    /// Calls `visit` with every grain in the cells whose steps from `centre` lie between `from` and `to` on each axis.
+    #[inline]
+    fn visit_cells(
+        &self,
+        centre: Vector3<i32>,
+        from: Vector3<i32>,
+        to: Vector3<i32>,
+        mut visit: impl FnMut(u32, Vector3<f64>),
+    ) {
+        let home = centre.zip_map(&self.slots, i32::rem_euclid);
+        // Steps are -1, 0 or 1, so one comparison replaces the modulus.
+        let slot = |axis: usize, step: i32| {
+            let at = home[axis] + step;
+            let count = self.slots[axis];
+            (if at < 0 {
+                at + count
+            } else if at >= count {
+                at - count
+            } else {
+                at
+            }) as usize
+        };
+        let [across, down] = [self.slots.x as usize, self.slots.y as usize];
+        for z in from.z..=to.z {
+            for y in from.y..=to.y {
+                let row = across * (slot(1, y) + down * slot(2, z));
+                for x in from.x..=to.x {
+                    let mut other = self.heads[row + slot(0, x)];
+                    while other != NOBODY {
+                        let place = &self.places[other as usize];
+                        visit(other, self.image(centre + Vector3::new(x, y, z), place.cell));
+                        other = place.next;
+                    }
+                }
+            }
+        }
+    }
+
+    /// The shift (m) that brings what is stored as being in `stored` to `cell`, which shares its slot.
+    #[inline]
+    fn image(&self, cell: Vector3<i32>, stored: Vector3<i32>) -> Vector3<f64> {
+        if !self.domain.periodic || cell == stored {
+            return Vector3::zeros();
+        }
+        let extent = self.domain.extent();
+        Vector3::from_fn(|axis, _| {
+            let periods = (cell[axis] - stored[axis]) / self.slots[axis];
+            // Along y of a planar domain the extent means nothing.
+            if periods == 0 { 0.0 } else { f64::from(periods) * extent[axis] }
+        })
+    }
+
+    /// Calls `visit` with every grain in the cells around `position`, where there need not be a grain.
+    pub(crate) fn visit_near(&self, position: Vector3<f64>, time: f64, visit: impl FnMut(u32, Vector3<f64>)) {
+        let (from, to) = self.all_around();
+        self.visit_cells(self.cell_of(position, time), from, to, visit);
+    }
+}
