@@ -1,4 +1,5 @@
 //! Impinge
 pub mod grains;
+pub mod law;
 pub mod scene;
 pub mod scheme;

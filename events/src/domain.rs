@@ -56,13 +56,34 @@ impl Domain {
         exit
     }
 
-    /// Moves `position` into a periodic domain; elsewhere nothing happens.
-    pub(crate) fn wrap(&self, position: &mut Vector3<f64>) {
+    /// Moves `position` (m) into a periodic domain; elsewhere nothing happens.
+    #[inline]
+    pub fn wrap(&self, position: &mut Vector3<f64>) {
         if self.periodic {
             for &axis in self.axes() {
                 let length = self.max[axis] - self.min[axis];
                 position[axis] -= ((position[axis] - self.min[axis]) / length).floor() * length;
             }
         }
+    }
+
+    /// The shortest of the periodic images of `apart`, a difference of two positions (m).
+    #[inline]
+    #[must_use]
+    pub fn nearest(&self, mut apart: Vector3<f64>) -> Vector3<f64> {
+        if self.periodic {
+            for &axis in self.axes() {
+                let length = self.max[axis] - self.min[axis];
+                apart[axis] -= (apart[axis] / length).round() * length;
+            }
+        }
+        apart
+    }
+
+    /// Whether grains of this radius (m) fit: a periodic domain must be at least eight radii wide, or the image that a grain meets
+    /// would not be clear.
+    #[must_use]
+    pub fn holds(&self, radius: f64) -> bool {
+        !self.periodic || self.axes().iter().all(|&axis| self.extent()[axis] >= crate::neighbors::least_period(radius))
     }
 }

@@ -41,6 +41,8 @@ struct Plan {
     pair: Event,
     /// With the surface or a side of the domain.
     side: Event,
+    /// Until when the surface has been looked at, s.
+    looked_until: f64,
     /// Out of its cell, along the axis `partner`.
     crossing: Event,
     /// Whether the surface stops this grain.
@@ -54,15 +56,22 @@ const fn never(kind: Kind) -> Event {
 const NO_PLAN: Plan = Plan {
     pair: never(Kind::Review),
     side: never(Kind::Exit),
+    looked_until: f64::NEG_INFINITY,
     crossing: never(Kind::Crossing),
     stopped_by_surface: true,
 };
 
 impl Plan {
+    /// The first of the three; they stand in the order of their kinds, so the earlier one wins where times are equal.
     #[inline]
-    fn first(&self, owner: u32) -> Event {
-        let earlier = |a: Event, b: Event| if b.order(owner, &a, owner).is_lt() { b } else { a };
-        earlier(self.pair, earlier(self.side, self.crossing))
+    fn first(&self) -> Event {
+        let mut first = self.crossing;
+        for event in [self.pair, self.side] {
+            if event.time < first.time {
+                first = event;
+            }
+        }
+        first
     }
 }
 
@@ -286,11 +295,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         let inside = || self.flights.iter().filter(|flight| !is_vacant(flight));
         let largest = inside().map(|flight| flight.radius).fold(0.0, f64::max);
         let mut cells = Cells::new(self.domain, largest, inside());
-        assert!(
-            cells.fits(largest),
-            "a periodic domain must be at least {} grains wide",
-            2 * crate::neighbors::FEWEST_PERIODIC_CELLS
-        );
+        assert!(self.domain.holds(largest), "the periodic domain is less than eight grain radii wide");
         for grain in self.inside() {
             cells.insert(grain, self.flight(grain));
         }
@@ -323,9 +328,11 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     /// Predicts everything that lies before a grain whose motion has changed.
     fn predict(&mut self, grain: u32) {
         let crossing = self.crossing(grain);
-        let side = self.side(grain, crossing.time.min(self.horizon));
+        let flight = self.flight(grain);
+        let exit = Event { time: self.domain.exit_time(flight), kind: Kind::Exit, partner: NOBODY };
         let plan = &mut self.plans[grain as usize];
-        (plan.crossing, plan.side) = (crossing, side);
+        (plan.crossing, plan.side, plan.looked_until) = (crossing, exit, f64::NEG_INFINITY);
+        self.look_at_surface(grain);
         self.find_partner(grain);
         self.reschedule(grain);
     }
@@ -342,48 +349,39 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         }
     }
 
-    /// When a grain hits the surface or leaves the domain, as far as can be seen until `until`.
+    /// Looks for the surface that a grain may hit before it leaves its cell.
     #[inline]
-    fn side(&self, grain: u32, until: f64) -> Event {
-        let flight = self.flight(grain);
-        let plan = &self.plans[grain as usize];
-        let exit = Event { time: self.domain.exit_time(flight), kind: Kind::Exit, partner: NOBODY };
-        if plan.stopped_by_surface
-            && let Outlook::Hit { time, element } = self.surface.first_contact(flight, until)
-            && time <= exit.time
-        {
-            return Event { time, kind: Kind::Surface, partner: element };
+    fn look_at_surface(&mut self, grain: u32) {
+        let plan = &mut self.plans[grain as usize];
+        let until = plan.crossing.time.min(self.horizon);
+        if !plan.stopped_by_surface || plan.looked_until >= until {
+            return;
         }
-        exit
+        match self.surface.first_contact(&self.flights[grain as usize], until) {
+            Outlook::Hit { time, element } => {
+                plan.looked_until = f64::INFINITY;
+                if time <= plan.side.time {
+                    plan.side = Event { time, kind: Kind::Surface, partner: element };
+                }
+            }
+            Outlook::ClearUntil(time) => plan.looked_until = time,
+        }
     }
 
     /// Finds the first grain that this one meets, among all that are near.
     #[inline]
     fn find_partner(&mut self, grain: u32) {
         let Some(cells) = &self.cells else { return };
-        let mut best = self.plans[grain as usize].pair;
-        cells.visit_around(grain, |other, shift| self.consider(grain, other, shift, &mut best));
+        let mut search = self.search(grain);
+        cells.visit_around(grain, |other, shift| search.consider(other, shift));
+        let best = search.best;
         self.plan_pair(grain, best);
     }
 
-    /// Takes the meeting of `grain` with `other` for `best` if it comes before all that either of them has planned.
-    ///
-    /// What `other` has planned earlier will deflect it, and then it looks for itself; so does whoever it leaves.
     #[inline]
-    fn consider(&self, grain: u32, other: u32, shift: Vector3<f64>, best: &mut Event) {
-        let Some(time) = sphere_sphere(self.flight(grain), self.flight(other), shift) else { return };
-        if time > best.time || time > self.horizon {
-            return;
-        }
-        let (mine, theirs) = (&self.plans[grain as usize], &self.plans[other as usize]);
-        let event = Event { time, kind: Kind::Grains, partner: other };
-        if event.order(grain, best, grain).is_lt()
-            && event.order(grain, &theirs.pair, other).is_lt()
-            && event.order(grain, &mine.side, grain).is_lt()
-            && event.order(grain, &theirs.side, other).is_lt()
-        {
-            *best = event;
-        }
+    fn search(&self, grain: u32) -> Search<'_> {
+        let best = self.plans[grain as usize].pair;
+        Search { grain, flights: &self.flights, plans: &self.plans, horizon: self.horizon, best }
     }
 
     /// Puts a meeting into the plans of both grains, and leaves the one that `grain` or its new partner had in mind before.
@@ -411,32 +409,61 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
 
     /// Moves a grain into the next cell and looks at the neighbours that it has there.
     fn cross(&mut self, grain: u32) {
-        let plan = self.plans[grain as usize];
-        let flight = self.flights[grain as usize];
-        let mut best = plan.pair;
-        // The grid is taken out while it hands its neighbours to `self`.
-        let mut cells = self.cells.take();
-        if let Some(cells) = &mut cells {
-            let axis = plan.crossing.partner as u8;
-            cells.cross(grain, &flight, axis, |other, shift| self.consider(grain, other, shift, &mut best));
+        let axis = self.plans[grain as usize].crossing.partner as u8;
+        let mut best = self.plans[grain as usize].pair;
+        if let Some(cells) = &mut self.cells {
+            let step = cells.cross(grain, &self.flights[grain as usize], axis);
+            let mut search = self.search(grain);
+            if let Some(cells) = &self.cells {
+                cells.visit_ahead(grain, axis, step, |other, shift| search.consider(other, shift));
+            }
+            best = search.best;
         }
-        self.cells = cells;
-        let crossing = self.crossing(grain);
-        self.plans[grain as usize].crossing = crossing;
-        if plan.side.kind != Kind::Surface {
-            self.plans[grain as usize].side = self.side(grain, crossing.time.min(self.horizon));
-        }
+        self.plans[grain as usize].crossing = self.crossing(grain);
+        self.look_at_surface(grain);
         self.plan_pair(grain, best);
         self.reschedule(grain);
     }
 
     #[inline]
     fn reschedule(&mut self, grain: u32) {
-        let first = self.plans[grain as usize].first(grain);
+        let first = self.plans[grain as usize].first();
         if first.time > self.horizon {
             self.calendar.cancel(grain);
         } else {
             self.calendar.schedule(grain, first);
+        }
+    }
+}
+
+/// A search for the first grain that `grain` meets.
+struct Search<'a> {
+    grain: u32,
+    flights: &'a [Flight],
+    plans: &'a [Plan],
+    horizon: f64,
+    /// The best so far.
+    best: Event,
+}
+
+impl Search<'_> {
+    /// Takes the meeting with `other` for the best if it comes before all that either of the two has planned.
+    ///
+    /// What `other` has planned earlier will deflect it, and then it looks for itself; so does whoever it leaves.
+    #[inline]
+    fn consider(&mut self, other: u32, shift: Vector3<f64>) {
+        let (grain, i, j) = (self.grain, self.grain as usize, other as usize);
+        let Some(time) = sphere_sphere(&self.flights[i], &self.flights[j], shift) else { return };
+        if time > self.best.time || time > self.horizon {
+            return;
+        }
+        let event = Event { time, kind: Kind::Grains, partner: other };
+        if event.is_before(grain, &self.best, grain)
+            && event.is_before(grain, &self.plans[j].pair, other)
+            && event.is_before(grain, &self.plans[i].side, grain)
+            && event.is_before(grain, &self.plans[j].side, other)
+        {
+            self.best = event;
         }
     }
 }

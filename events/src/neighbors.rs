@@ -1,10 +1,9 @@
 //! Who can meet whom before when: cells that drift with the stream.
 //!
 //! A grain can only touch grains in its own cell and the cells around it until it leaves its cell. The grid of cells moves at
-//! a constant velocity, so grains that fly side by side at that velocity never cross a cell. The grid has no bounds: cell
-//! k along an axis is kept in slot k modulo the number of slots, so memory follows the grains and not the domain. Two far
-//! cells may share a slot; their grains are then looked at for nothing, but never missed. In a periodic domain the slots
-//! tile the period, and the same modulus is the periodic image.
+//! a constant velocity, so grains that fly side by side at that velocity never cross a cell. The grid has no bounds: cells
+//! are hashed into slots, so memory follows the grains and not the domain; grains of another cell that share a slot are
+//! passed over. In a periodic domain a whole number of cells tiles the period.
 //!
 //! Cells are bookkeeping: neither their size nor their drift can change a bit of a prediction.
 
@@ -15,18 +14,29 @@ use crate::{Domain, Flight};
 /// A cell is wider than the largest contact distance by this fraction, so that a crossing that is late by rounding cannot
 /// hide a contact; the position of a grain is known to about 1e-16 of its distance from the origin.
 const CELL_MARGIN: f64 = 1e-6;
-/// Fewest slots along an axis of an open domain: with three, a cell and its two neighbours are different slots.
-const FEWEST_SLOTS: i32 = 3;
 /// Fewest cells along an axis of a periodic domain. With four, two grains in adjacent cells have one nearest image.
-pub(crate) const FEWEST_PERIODIC_CELLS: i32 = 4;
-/// Cells for each grain, about: more cost memory, fewer are shared by far cells.
+const FEWEST_PERIODIC_CELLS: i32 = 4;
+/// Slots for each grain, at least: more cost memory, fewer are shared by cells.
 const SLOTS_PER_GRAIN: usize = 4;
+/// Steps between the slots of cells that are adjacent along x, y and z, modulo the number of slots (a power of two). Odd
+/// fractions of 2^32 without a pattern (2^32 over the golden ratio, and over its square root) scatter the rows; along x cells
+/// stay side by side in memory.
+const STRIDES: Vector3<u32> = Vector3::new(1, 0x9E37_79B1, 0xC949_57E9);
 const NOBODY: u32 = u32::MAX;
+
+/// Smallest length of a period for grains of this radius, m.
+pub(crate) fn least_period(radius: f64) -> f64 {
+    f64::from(FEWEST_PERIODIC_CELLS) * contact_width(radius)
+}
+
+fn contact_width(largest_radius: f64) -> f64 {
+    2.0 * largest_radius * (1.0 + CELL_MARGIN)
+}
 
 /// Where a grain stands in the grid.
 #[derive(Clone, Copy, Debug)]
 struct Place {
-    /// Cell along each axis; counts on beyond the slots and beyond the period.
+    /// Cell along each axis; counts on beyond the period.
     cell: Vector3<i32>,
     next: u32,
     previous: u32,
@@ -46,7 +56,8 @@ pub(crate) struct Crossing {
 #[derive(Clone, Debug)]
 pub(crate) struct Cells {
     size: Vector3<f64>,
-    slots: Vector3<i32>,
+    /// Cells in a period along each axis; 0 where there is none.
+    period: Vector3<i32>,
     /// Corner of cell (0, 0, 0) at epoch time 0, m.
     corner: Vector3<f64>,
     drift: Vector3<f64>,
@@ -73,10 +84,9 @@ impl Cells {
         if count == 0 {
             (low, high) = (Vector3::zeros(), Vector3::zeros());
         }
-        let slots_wanted = (SLOTS_PER_GRAIN * count).max(64) as f64;
+        let slots = (SLOTS_PER_GRAIN * count).max(64).next_power_of_two();
         let axes = domain.axes();
-        let contact = 2.0 * largest_radius * (1.0 + CELL_MARGIN);
-        let (mut size, mut slots) = (Vector3::repeat(contact), Vector3::repeat(1));
+        let contact = contact_width(largest_radius);
         let drift = if domain.periodic || count == 0 { Vector3::zeros() } else { momentum / count as f64 };
         if domain.periodic {
             (low, high) = (domain.min, domain.max);
@@ -84,24 +94,20 @@ impl Cells {
         let extent = |axis: usize| (high[axis] - low[axis]).max(contact);
         // Cells of the size of a contact where grains are dense, larger ones where that would leave most of them empty.
         let volume: f64 = axes.iter().map(|&axis| extent(axis)).product();
-        let width = contact.max((volume / slots_wanted).powf(1.0 / axes.len() as f64));
-        for &axis in axes {
-            let cells = (extent(axis) / width).floor().clamp(1.0, 1e6) as i32;
-            if domain.periodic {
-                slots[axis] = cells.max(FEWEST_PERIODIC_CELLS);
-                size[axis] = extent(axis) / f64::from(slots[axis]);
-            } else {
-                slots[axis] = cells.max(FEWEST_SLOTS);
-                size[axis] = width;
+        let width = contact.max((volume / slots as f64).powf(1.0 / axes.len() as f64));
+        let (mut size, mut period) = (Vector3::repeat(width), Vector3::zeros());
+        if domain.periodic {
+            for &axis in axes {
+                period[axis] = ((extent(axis) / width).floor() as i32).max(FEWEST_PERIODIC_CELLS);
+                size[axis] = extent(axis) / f64::from(period[axis]);
             }
         }
-        let heads = vec![NOBODY; slots.iter().map(|&n| n as usize).product()];
-        Self { size, slots, corner: low, drift, domain, heads, places: Vec::new() }
+        Self { size, period, corner: low, drift, domain, heads: vec![NOBODY; slots], places: Vec::new() }
     }
 
     /// Whether grains of this radius fit the cells.
     pub(crate) fn fits(&self, radius: f64) -> bool {
-        self.domain.axes().iter().all(|&axis| 2.0 * radius * (1.0 + CELL_MARGIN) <= self.size[axis])
+        self.domain.axes().iter().all(|&axis| contact_width(radius) <= self.size[axis])
     }
 
     /// Whether so many grains would crowd the slots.
@@ -122,9 +128,21 @@ impl Cells {
         cell
     }
 
-    fn slot(&self, cell: Vector3<i32>) -> usize {
-        let at = |axis: usize| cell[axis].rem_euclid(self.slots[axis]) as usize;
-        at(0) + self.slots.x as usize * (at(1) + self.slots.y as usize * at(2))
+    /// Coordinate along `axis` of the cell in the period that stands for `cell`.
+    #[inline]
+    fn home(&self, cell: Vector3<i32>, axis: usize) -> i32 {
+        if self.period[axis] == 0 { cell[axis] } else { cell[axis].rem_euclid(self.period[axis]) }
+    }
+
+    /// The slot of a cell in the period.
+    #[inline]
+    fn slot(&self, home: Vector3<i32>) -> usize {
+        let sum = home.zip_map(&STRIDES, |k, stride| (k as u32).wrapping_mul(stride));
+        (sum.x.wrapping_add(sum.y).wrapping_add(sum.z)) as usize & (self.heads.len() - 1)
+    }
+
+    fn slot_of(&self, cell: Vector3<i32>) -> usize {
+        self.slot(Vector3::from_fn(|axis, _| self.home(cell, axis)))
     }
 
     /// Puts grain `id` into the cell where it is at its local time.
@@ -137,7 +155,7 @@ impl Cells {
     }
 
     fn link(&mut self, id: u32) {
-        let slot = self.slot(self.places[id as usize].cell);
+        let slot = self.slot_of(self.places[id as usize].cell);
         let first = std::mem::replace(&mut self.heads[slot], id);
         self.places[id as usize].next = first;
         self.places[id as usize].previous = NOBODY;
@@ -150,7 +168,7 @@ impl Cells {
     pub(crate) fn remove(&mut self, id: u32) {
         let Place { cell, next, previous } = self.places[id as usize];
         if previous == NOBODY {
-            let slot = self.slot(cell);
+            let slot = self.slot_of(cell);
             self.heads[slot] = next;
         } else {
             self.places[previous as usize].next = next;
@@ -163,7 +181,7 @@ impl Cells {
     /// Tells the grid that a periodic wrap has moved the stored position of `id` by `shift`.
     pub(crate) fn wrapped(&mut self, id: u32, shift: Vector3<f64>) {
         let periods = shift.component_div(&self.domain.extent()).map(|x| x.round() as i32);
-        self.places[id as usize].cell += periods.component_mul(&self.slots);
+        self.places[id as usize].cell += periods.component_mul(&self.period);
     }
 
     /// When and through which side `flight` leaves its cell.
@@ -184,13 +202,20 @@ impl Cells {
         first
     }
 
-    /// Moves grain `id` into the next cell along `axis`, and calls `visit` with every grain in the cells that have become adjacent.
-    pub(crate) fn cross(&mut self, id: u32, flight: &Flight, axis: u8, visit: impl FnMut(u32, Vector3<f64>)) {
+    /// Moves grain `id` into the next cell along `axis` and tells which way it went.
+    pub(crate) fn cross(&mut self, id: u32, flight: &Flight, axis: u8) -> i32 {
         let axis = usize::from(axis);
         let step = if flight.velocity[axis] > self.drift[axis] { 1 } else { -1 };
         self.remove(id);
         self.places[id as usize].cell[axis] += step;
         self.link(id);
+        step
+    }
+
+    /// Calls `visit` with every grain in the cells that have become adjacent to grain `id` by its last `step` along `axis`.
+    #[inline]
+    pub(crate) fn visit_ahead(&self, id: u32, axis: u8, step: i32, visit: impl FnMut(u32, Vector3<f64>)) {
+        let axis = usize::from(axis);
         let (mut from, mut to) = self.all_around();
         (from[axis], to[axis]) = (step, step);
         self.visit_others(id, from, to, visit);
@@ -227,28 +252,19 @@ impl Cells {
         to: Vector3<i32>,
         mut visit: impl FnMut(u32, Vector3<f64>),
     ) {
-        let home = centre.zip_map(&self.slots, i32::rem_euclid);
-        // Steps are -1, 0 or 1, so one comparison replaces the modulus.
-        let slot = |axis: usize, step: i32| {
-            let at = home[axis] + step;
-            let count = self.slots[axis];
-            (if at < 0 {
-                at + count
-            } else if at >= count {
-                at - count
-            } else {
-                at
-            }) as usize
-        };
-        let [across, down] = [self.slots.x as usize, self.slots.y as usize];
+        let mask = self.heads.len() - 1;
         for z in from.z..=to.z {
             for y in from.y..=to.y {
-                let row = across * (slot(1, y) + down * slot(2, z));
+                let row = centre + Vector3::new(0, y, z);
+                let start = self.slot(Vector3::new(0, self.home(row, 1), self.home(row, 2)));
                 for x in from.x..=to.x {
-                    let mut other = self.heads[row + slot(0, x)];
+                    let cell = row + Vector3::new(x, 0, 0);
+                    let mut other = self.heads[(start + self.home(cell, 0) as usize) & mask];
                     while other != NOBODY {
                         let place = &self.places[other as usize];
-                        visit(other, self.image(centre + Vector3::new(x, y, z), place.cell));
+                        if let Some(shift) = self.image(cell, place.cell) {
+                            visit(other, shift);
+                        }
                         other = place.next;
                     }
                 }
@@ -256,18 +272,24 @@ impl Cells {
         }
     }
 
-    /// The shift (m) that brings what is stored as being in `stored` to `cell`, which shares its slot.
+    /// The shift (m) that brings what is stored as being in `stored` to `cell`; `None` if the two are different cells.
     #[inline]
-    fn image(&self, cell: Vector3<i32>, stored: Vector3<i32>) -> Vector3<f64> {
-        if !self.domain.periodic || cell == stored {
-            return Vector3::zeros();
+    fn image(&self, cell: Vector3<i32>, stored: Vector3<i32>) -> Option<Vector3<f64>> {
+        if cell == stored {
+            return Some(Vector3::zeros());
         }
-        let extent = self.domain.extent();
-        Vector3::from_fn(|axis, _| {
-            let periods = (cell[axis] - stored[axis]) / self.slots[axis];
-            // Along y of a planar domain the extent means nothing.
-            if periods == 0 { 0.0 } else { f64::from(periods) * extent[axis] }
-        })
+        if !self.domain.periodic {
+            return None;
+        }
+        let mut shift = Vector3::zeros();
+        for &axis in self.domain.axes() {
+            let (steps, period) = (cell[axis] - stored[axis], self.period[axis]);
+            if steps % period != 0 {
+                return None;
+            }
+            shift[axis] = f64::from(steps / period) * (self.domain.max[axis] - self.domain.min[axis]);
+        }
+        Some(shift)
     }
 
     /// Calls `visit` with every grain in the cells around `position`, where there need not be a grain.

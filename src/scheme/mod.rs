@@ -1,9 +1,60 @@
 //! Ways to advance time, and what each of them reports to its observers.
 
+mod event_driven;
+mod timetable;
+
+pub use event_driven::{EventDriven, LARGEST_OVERLAP, Laws};
+pub use timetable::Moments;
+
+use impinge_events::Flight;
 use nalgebra::Vector3;
 
 use crate::grains::{Grain, Snapshot};
-use impinge_events::Flight;
+
+/// How far a run has come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Progress {
+    /// Simulated time, s.
+    pub time: f64,
+    /// Collisions so far, grain–grain and grain–surface.
+    pub collisions: u64,
+    /// Grains inside.
+    pub inside: usize,
+}
+
+/// A broken invariant: the run has gone wrong and stops.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Broken {
+    /// Grains overlap each other or the surface by more than rounding can explain.
+    #[error("at t = {time} s {} by {overlap:.3e} radii (allowed: {LARGEST_OVERLAP:.0e})", overlapping(grains))]
+    Overlap {
+        /// Simulated time, s.
+        time: f64,
+        /// Ids of the grains; one where the partner is the surface.
+        grains: Vec<u64>,
+        /// Overlap over the smaller radius.
+        overlap: f64,
+    },
+    /// A velocity is no finite number.
+    #[error("at t = {time} s the velocity of grain {} is no finite number", list(grains))]
+    NotANumber {
+        /// Simulated time, s.
+        time: f64,
+        /// Ids of the grains.
+        grains: Vec<u64>,
+    },
+}
+
+fn overlapping(grains: &[u64]) -> String {
+    match grains {
+        [grain] => format!("grain {grain} overlaps the surface"),
+        _ => format!("grains {} overlap", list(grains)),
+    }
+}
+
+fn list(grains: &[u64]) -> String {
+    grains.iter().map(u64::to_string).collect::<Vec<_>>().join(" and ")
+}
 
 /// A collision between two grains, as observers see it.
 #[derive(Clone, Copy, Debug, PartialEq)]

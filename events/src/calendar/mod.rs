@@ -42,6 +42,13 @@ pub struct Event {
 }
 
 impl Event {
+    /// Whether this event of `owner` comes before another.
+    #[inline]
+    #[must_use]
+    pub fn is_before(&self, owner: u32, other: &Self, other_owner: u32) -> bool {
+        self.time < other.time || (self.time == other.time && self.order(owner, other, other_owner).is_lt())
+    }
+
     /// The place of this event of `owner` in the total order (time, kind, lower id, higher id).
     #[inline]
     #[must_use]

@@ -30,10 +30,12 @@ pub struct Tournament {
 impl Tournament {
     #[inline]
     fn earlier(&self, left: Entry, right: Entry) -> Entry {
-        match left.time.partial_cmp(&right.time) {
-            Some(Ordering::Less) => left,
-            Some(Ordering::Greater) => right,
-            _ => self.earlier_of_simultaneous(left, right),
+        if left.time < right.time {
+            left
+        } else if right.time < left.time {
+            right
+        } else {
+            self.earlier_of_simultaneous(left, right)
         }
     }
 
@@ -50,15 +52,17 @@ impl Tournament {
     #[inline]
     fn replay(&mut self, owner: u32, entry: Entry) {
         let mut node = self.leaves + owner as usize;
-        self.nodes[node] = entry;
+        let mut winner = entry;
+        self.nodes[node] = winner;
         while node > 1 {
-            let winner = self.earlier(self.nodes[node & !1], self.nodes[node | 1]);
+            winner = self.earlier(winner, self.nodes[node ^ 1]);
             node /= 2;
+            let match_ = &mut self.nodes[node];
             // The same owner at the same time may be another event, and stand elsewhere among simultaneous ones.
-            if self.nodes[node] == winner && winner.owner != owner {
+            if *match_ == winner && winner.owner != owner {
                 break;
             }
-            self.nodes[node] = winner;
+            *match_ = winner;
         }
     }
 }
@@ -68,8 +72,8 @@ impl Calendar for Tournament {
         if owners <= self.leaves {
             return;
         }
-        self.events.resize(owners, NO_EVENT);
         self.leaves = owners.next_power_of_two();
+        self.events.resize(self.leaves, NO_EVENT);
         self.nodes.clear();
         self.nodes.resize(2 * self.leaves, ABSENT);
         for (owner, event) in (0..).zip(&self.events) {
@@ -84,9 +88,8 @@ impl Calendar for Tournament {
 
     #[inline]
     fn schedule(&mut self, owner: u32, event: Event) {
-        self.reserve(owner as usize + 1);
-        if self.events.len() <= owner as usize {
-            self.events.resize(owner as usize + 1, NO_EVENT);
+        if owner as usize >= self.events.len() {
+            self.reserve(owner as usize + 1);
         }
         self.events[owner as usize] = event;
         let entry = if event.time < f64::INFINITY { Entry { time: event.time, owner } } else { ABSENT };

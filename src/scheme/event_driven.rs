@@ -1,0 +1,299 @@
+//! From one predicted collision to the next.
+
+use std::ops::ControlFlow;
+
+use impinge_events::calendar::{Calendar, Tournament};
+use impinge_events::{Domain, Encounter, Encounters, Flight, Surface};
+use nalgebra::Vector3;
+
+use super::{Broken, GrainCollision, Observer, Passage, Progress, SurfaceHit};
+use crate::grains::{Grain, NewGrain, Snapshot};
+use crate::law::{Body, ContactLaw, resolve_pair, resolve_surface};
+use crate::scene::Interference;
+
+/// Length of an epoch in the time that the fastest grain needs for its own radius (of the smallest grain).
+///
+/// Within an epoch a time is known to 2^-53 of the epoch, so a position to 4096 × 2^-53 = 5e-13 radii.
+const EPOCH_RADII: f64 = 4096.0;
+/// Overlap at an event, over the smaller radius, above which a run is wrong and stops. Rounding leaves about 1e-13.
+pub const LARGEST_OVERLAP: f64 = 1e-9;
+/// Encounters between two looks at the watch (progress, Ctrl-C).
+const ENCOUNTERS_PER_WATCH: u32 = 4096;
+
+/// What happens at a contact, and which contacts count.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Laws {
+    /// Between two grains.
+    pub grain: ContactLaw,
+    /// Between a grain and the surface.
+    pub surface: ContactLaw,
+    /// Which collisions take part.
+    pub interference: Interference,
+}
+
+/// Grains, what they meet, and the laws of their meetings; advanced from event to event.
+#[derive(Clone, Debug)]
+pub struct EventDriven<S: Surface, C: Calendar = Tournament> {
+    encounters: Encounters<S, C>,
+    /// What grains carry besides their flights, by the numbers of `encounters`.
+    grains: Vec<Grain>,
+    laws: Laws,
+    domain: Domain,
+    /// Simulated time at the start of the epoch, s.
+    epoch_start: f64,
+    /// Length of the epoch, s: a power of two, so that `epoch_start` stays exact.
+    epoch: f64,
+    /// Simulated time that has been reached, s.
+    time: f64,
+    entered: u64,
+    collisions: u64,
+    since_watch: u32,
+}
+
+impl<S: Surface, C: Calendar> EventDriven<S, C> {
+    /// A run that starts at simulated time `start` (s) with `grains` inside.
+    #[must_use]
+    pub fn new(grains: &[NewGrain], surface: S, domain: Domain, laws: Laws, start: f64) -> Self {
+        let flights = grains.iter().map(flight).collect();
+        let encounters = match laws.interference {
+            Interference::None => Encounters::transparent(flights, surface, domain),
+            _ => Encounters::new(flights, surface, domain),
+        };
+        let carried = grains.iter().zip(0..).map(|(grain, id)| carried(grain, id)).collect();
+        let entered = grains.len() as u64;
+        let mut scheme = Self {
+            encounters,
+            grains: carried,
+            laws,
+            domain,
+            epoch_start: start,
+            epoch: 0.0,
+            time: start,
+            entered,
+            collisions: 0,
+            since_watch: 0,
+        };
+        scheme.start_epoch();
+        scheme
+    }
+
+    /// Simulated time that has been reached, s.
+    #[must_use]
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// What the grains can hit.
+    #[must_use]
+    pub fn surface(&self) -> &S {
+        self.encounters.surface()
+    }
+
+    /// Simulated time at the end of the current epoch, s.
+    pub fn epoch_end(&self) -> f64 {
+        self.epoch_start + self.epoch
+    }
+
+    /// Starts the next epoch at the end of the current one, and chooses its length by the fastest grain.
+    pub fn start_epoch(&mut self) {
+        let mut fastest = 0f64;
+        let mut smallest = f64::INFINITY;
+        for grain in self.encounters.inside() {
+            let flight = self.encounters.flight(grain);
+            fastest = fastest.max(flight.velocity.norm());
+            smallest = smallest.min(flight.radius);
+        }
+        let wanted = EPOCH_RADII * smallest / fastest;
+        // Without grains, or with grains at rest, there is nothing to resolve.
+        let next = if wanted.is_finite() { 2f64.powi(wanted.log2().floor() as i32) } else { 2f64.powi(20) };
+        self.encounters.start_epoch(self.epoch, next);
+        self.epoch_start += self.epoch;
+        self.epoch = next;
+    }
+
+    /// Resolves all events up to simulated time `end` (s), which lies in the current epoch.
+    ///
+    /// # Errors
+    /// A broken invariant: grains that overlap, or a state that is no number.
+    pub fn advance(
+        &mut self,
+        end: f64,
+        observer: &mut impl Observer,
+        watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<ControlFlow<()>, Broken> {
+        while let Some((time, encounter)) = self.encounters.next_before(end - self.epoch_start) {
+            match encounter {
+                Encounter::Grains { a, b } => self.collide(time, a, b, observer)?,
+                Encounter::Surface { grain, element } => self.hit(time, grain, element, observer)?,
+                Encounter::Exit { grain } => self.take_out(Passage::Left, time, grain, observer),
+            }
+            self.since_watch += 1;
+            if self.since_watch == ENCOUNTERS_PER_WATCH {
+                self.since_watch = 0;
+                self.time = self.epoch_start + time;
+                if watch(self.progress()).is_break() {
+                    return Ok(ControlFlow::Break(()));
+                }
+            }
+        }
+        self.time = end;
+        Ok(watch(self.progress()))
+    }
+
+    fn progress(&self) -> Progress {
+        Progress { time: self.time, collisions: self.collisions, inside: self.encounters.count() }
+    }
+
+    /// Two grains touch.
+    fn collide(&mut self, time: f64, a: u32, b: u32, observer: &mut impl Observer) -> Result<(), Broken> {
+        // The lower id is the first of the two: slots are used again, ids are not.
+        let (a, b) = if self.grains[a as usize].id < self.grains[b as usize].id { (a, b) } else { (b, a) };
+        let (first, second) = (self.body(a), self.body(b));
+        let (flight_a, flight_b) = (*self.encounters.flight(a), *self.encounters.flight(b));
+        let apart = self.domain.nearest(flight_b.position - flight_a.position);
+        let distance = apart.norm();
+        let normal = apart / distance;
+        let ids = [self.grains[a as usize].id, self.grains[b as usize].id];
+        let overlap_over_radius = (first.radius + second.radius - distance) / first.radius.min(second.radius);
+        let shielded = self.laws.interference == Interference::RemovedOnFirstCollision
+            && (self.grains[a as usize].hits == 0) != (self.grains[b as usize].hits == 0);
+        if shielded {
+            let (fresh, other) = if self.grains[a as usize].hits == 0 { (a, b) } else { (b, a) };
+            self.take_out(Passage::Removed, time, fresh, observer);
+            let onwards = self.encounters.flight(other).velocity;
+            self.encounters.deflect(&[(other, onwards)]);
+            return Ok(());
+        }
+        let contact = resolve_pair(&self.laws.grain, &first, &second, normal);
+        let [after_a, after_b] = contact.after;
+        self.check(time, &ids, overlap_over_radius, &[after_a.velocity, after_b.velocity])?;
+        self.grains[a as usize].spin = after_a.spin;
+        self.grains[b as usize].spin = after_b.spin;
+        self.encounters.deflect(&[(a, after_a.velocity), (b, after_b.velocity)]);
+        self.collisions += 1;
+        observer.grain_collision(&GrainCollision {
+            time: self.epoch_start + time,
+            ids,
+            position: flight_a.position + normal * first.radius,
+            normal,
+            impulse_normal: contact.impulse.normal,
+            impulse_tangential: contact.impulse.tangential.norm(),
+            approach_speed: contact.approach_speed,
+            dissipated: contact.impulse.dissipated,
+            overlap_over_radius,
+        });
+        Ok(())
+    }
+
+    /// A grain touches the surface.
+    fn hit(&mut self, time: f64, grain: u32, element: u32, observer: &mut impl Observer) -> Result<(), Broken> {
+        let before = self.body(grain);
+        let flight = *self.encounters.flight(grain);
+        let contact = self.encounters.surface().contact(element, &flight);
+        let resolved = resolve_surface(&self.laws.surface, &before, contact.normal, contact.velocity);
+        let id = self.grains[grain as usize].id;
+        let overlap_over_radius = -contact.gap / before.radius;
+        self.check(time, &[id], overlap_over_radius, &[resolved.after.velocity])?;
+        let carried = &mut self.grains[grain as usize];
+        carried.spin = resolved.after.spin;
+        carried.hits += 1;
+        let order = carried.hits;
+        if matches!(self.laws.interference, Interference::FirstOrder | Interference::RemovedOnFirstCollision) {
+            self.encounters.pass_through_surface(grain);
+        }
+        self.encounters.deflect(&[(grain, resolved.after.velocity)]);
+        self.collisions += 1;
+        let arriving = before.velocity - contact.velocity;
+        let energy_normal = 0.5 * before.mass * arriving.dot(&contact.normal).powi(2);
+        let along = arriving - contact.normal * arriving.dot(&contact.normal);
+        observer.surface_hit(&SurfaceHit {
+            time: self.epoch_start + time,
+            id,
+            element,
+            position: flight.position - contact.normal * (before.radius + contact.gap),
+            normal: contact.normal,
+            order,
+            impulse_normal: resolved.impulse.normal,
+            impulse_tangential: -resolved.impulse.tangential,
+            approach_speed: resolved.approach_speed,
+            energy_normal,
+            energy_tangential: 0.5 * before.mass * along.norm_squared(),
+            energy_spin: 0.2 * before.mass * before.radius.powi(2) * before.spin.norm_squared(),
+            dissipated: resolved.impulse.dissipated,
+            work: resolved.work,
+            overlap_over_radius,
+        });
+        Ok(())
+    }
+
+    fn take_out(&mut self, passage: Passage, time: f64, grain: u32, observer: &mut impl Observer) {
+        let flight = *self.encounters.flight(grain);
+        observer.passage(passage, self.epoch_start + time, &flight, &self.grains[grain as usize]);
+        self.encounters.remove(grain);
+    }
+
+    /// Takes a grain in at simulated time `time` (s), which lies in the current epoch and to which the run has been advanced.
+    pub fn enter(&mut self, time: f64, new: &NewGrain, observer: &mut impl Observer) {
+        let flight = Flight { time: time - self.epoch_start, ..flight(new) };
+        let grain = carried(new, self.entered);
+        self.entered += 1;
+        let slot = self.encounters.insert(flight) as usize;
+        if slot == self.grains.len() {
+            self.grains.push(grain);
+        } else {
+            self.grains[slot] = grain;
+        }
+        observer.passage(Passage::Entered, time, &flight, &grain);
+    }
+
+    /// Whether a grain of this radius fits in at `position` at simulated time `time` (s).
+    pub fn is_free(&self, position: Vector3<f64>, radius: f64, time: f64) -> bool {
+        self.encounters.is_free(position, radius, time - self.epoch_start)
+    }
+
+    /// Shows all grains at simulated time `time` (s), which lies in the current epoch.
+    pub fn snapshot<R>(&self, time: f64, look: impl FnOnce(&Snapshot<'_>) -> R) -> R {
+        let mut slots: Vec<u32> = self.encounters.inside().collect();
+        slots.sort_unstable_by_key(|&slot| self.grains[slot as usize].id);
+        let at = |&slot: &u32| {
+            let mut flight = self.encounters.flight(slot).advanced_to(time - self.epoch_start);
+            flight.time = 0.0;
+            self.domain.wrap(&mut flight.position);
+            flight
+        };
+        let flights: Vec<Flight> = slots.iter().map(at).collect();
+        let grains: Vec<Grain> = slots.iter().map(|&slot| self.grains[slot as usize]).collect();
+        look(&Snapshot { time, flights: &flights, grains: &grains })
+    }
+
+    #[inline]
+    fn body(&self, grain: u32) -> Body {
+        let flight = self.encounters.flight(grain);
+        let Grain { mass, spin, .. } = self.grains[grain as usize];
+        Body { mass, radius: flight.radius, velocity: flight.velocity, spin }
+    }
+
+    /// Stops the run where an invariant is broken.
+    #[inline]
+    fn check(&self, time: f64, ids: &[u64], overlap: f64, velocities: &[Vector3<f64>]) -> Result<(), Broken> {
+        let numbers = velocities.iter().all(|velocity| velocity.norm_squared().is_finite());
+        if overlap <= LARGEST_OVERLAP && numbers {
+            return Ok(());
+        }
+        Err(broken(self.epoch_start + time, ids, overlap, numbers))
+    }
+}
+
+#[cold]
+fn broken(time: f64, ids: &[u64], overlap: f64, numbers: bool) -> Broken {
+    let grains = ids.to_vec();
+    if numbers { Broken::Overlap { time, grains, overlap } } else { Broken::NotANumber { time, grains } }
+}
+
+fn flight(grain: &NewGrain) -> Flight {
+    Flight { position: grain.position, time: 0.0, velocity: grain.velocity, radius: grain.radius }
+}
+
+fn carried(grain: &NewGrain, id: u64) -> Grain {
+    Grain { id, mass: grain.mass(), spin: grain.spin, hits: 0 }
+}
