@@ -54,7 +54,7 @@ fn describe(out: &mut String, file: &SceneFile) -> fmt::Result {
 }
 
 fn sources(out: &mut String, scene: &Scene, folder: &Path) -> fmt::Result {
-    let (mut count, mut collisions) = (0.0, 0.0);
+    let mut count = 0.0;
     let what = if scene.domain.planar { "area fraction" } else { "volume fraction" };
     for (i, source) in scene.source.iter().enumerate() {
         let kind = match source {
@@ -75,17 +75,16 @@ fn sources(out: &mut String, scene: &Scene, folder: &Path) -> fmt::Result {
         writeln!(out, "source[{i}]   {kind}: {} grains, mean radius {radius} m, {mass:.4e} kg", crowd.count)?;
         writeln!(out, "            {what} {:.4}", crowd.fraction())?;
         writeln!(out, "            mean free path {:.3e} m (dilute gas as dense as this)", crowd.mean_free_path())?;
-        if let Some((number, formula)) = crowd.collisions(scene) {
-            collisions += number;
-            writeln!(out, "            about {number:.1e} collisions between grains")?;
-            writeln!(out, "            ({formula})")?;
+        match crowd.collisions(scene) {
+            Some((number, formula)) => {
+                writeln!(out, "            about {number:.1e} collisions between grains")?;
+                writeln!(out, "            ({formula})")?;
+            }
+            None => writeln!(out, "            collisions between grains not estimated")?,
         }
     }
     let megabytes = count * BYTES_PER_GRAIN / 1e6;
-    writeln!(
-        out,
-        "in all      {count} grains, about {collisions:.1e} collisions between them, at most {megabytes:.1} MB"
-    )
+    writeln!(out, "in all      {count} grains, at most {megabytes:.1} MB ({BYTES_PER_GRAIN} bytes a grain)")
 }
 
 fn friction(friction: &Friction) -> String {

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, SQRT_2};
 
 use impinge::grains::sphere_volume;
 use impinge::scene::{
-    Arrangement, Boundary, Distribution, Flow, NozzleShape, NozzleSource, Radius, Scene, Source, Vec3,
+    Arrangement, Boundary, Distribution, Flow, Interference, NozzleShape, NozzleSource, Radius, Scene, Source, Vec3,
 };
 
 /// Means over the radii of a source: radius (m), its square and its cube.
@@ -166,8 +166,11 @@ impl Crowd {
         1.0 / (SQRT_2 * self.density * self.radius.cross_section(self.planar))
     }
 
-    /// Expected grain–grain collisions and their formula; nothing where neither heat nor a surface makes grains meet.
+    /// Expected grain–grain collisions and their formula; nothing where there is no simple one.
     pub(super) fn collisions(&self, scene: &Scene) -> Option<(f64, &'static str)> {
+        if scene.run.interference == Interference::None {
+            return Some((0.0, "grains pass through each other"));
+        }
         if self.thermal_speed > 0.0 && !self.planar {
             let duration = scene.run.until - scene.run.start;
             return Some((0.5 * self.count * self.enskog_rate() * duration, ENSKOG));

@@ -2,7 +2,7 @@
 
 use toml::Value;
 
-use super::{Boundary, Contact, Friction, Interference, Invalid, Radius, Scene, Source, Surface, Vec3};
+use super::{Arrangement, Boundary, Contact, Friction, Interference, Invalid, Radius, Scene, Source, Surface, Vec3};
 
 /// Most grains that blocks and lattices of one scene may ask for. At the 600 bytes that a grain costs they fill 60 GB; more is
 /// a misplaced exponent, and is better refused than tried.
@@ -56,7 +56,7 @@ pub fn check_radius(key: &str, radius: &Radius) -> Checked {
     };
     Err(Invalid::new(
         format!("{key}.cv"),
-        format!("a coefficient of variation of {} would draw radii below 0", drawn.cv),
+        format!("a coefficient of variation of {} is outside what this distribution allows", drawn.cv),
         remedy,
     ))
 }
@@ -184,9 +184,13 @@ fn sources(scene: &Scene) -> Checked {
     for (i, source) in scene.source.iter().enumerate() {
         let (name, count) = match source {
             Source::Block(block) => ("count", block.count),
-            // Four places at most in a cell.
-            Source::Lattice(l) => {
-                ("cells", l.cells.iter().fold(1_u64, |n, &c| n.saturating_mul(c.into())).saturating_mul(4))
+            Source::Lattice(lattice) => {
+                let places = if lattice.arrangement == Arrangement::FaceCentred { 4 } else { 1 };
+                let [x, y, z] = lattice.cells.map(u64::from);
+                (
+                    "cells",
+                    x.saturating_mul(if scene.domain.planar { 1 } else { y }).saturating_mul(z).saturating_mul(places),
+                )
             }
             Source::File(_) | Source::Nozzle(_) => continue,
         };

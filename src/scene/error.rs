@@ -38,7 +38,7 @@ pub struct SceneError {
     what: String,
     remedy: String,
     /// Text of the file and the bytes to point at.
-    place: Option<(NamedSource<String>, Range<usize>)>,
+    place: Option<Box<(NamedSource<String>, Range<usize>)>>,
 }
 
 impl SceneError {
@@ -58,7 +58,7 @@ impl SceneError {
         let start = text.floor_char_boundary(bytes.start);
         let place =
             (NamedSource::new(file.to_string_lossy(), text.to_owned()), start..bytes.end.clamp(start, text.len()));
-        Self { file: file.to_owned(), typed: None, what, remedy, place: Some(place) }
+        Self { file: file.to_owned(), typed: None, what, remedy, place: Some(Box::new(place)) }
     }
 
     /// A fault of an override, `typed` on the command line.
@@ -75,7 +75,7 @@ impl SceneError {
     /// Line and column in the file, both from 1; none when the fault is not in the file.
     #[must_use]
     pub fn line_column(&self) -> Option<(usize, usize)> {
-        let (source, bytes) = self.place.as_ref()?;
+        let (source, bytes) = self.place.as_deref()?;
         let before = &source.inner()[..bytes.start];
         let line = before.matches('\n').count() + 1;
         let column = before.rsplit('\n').next().unwrap_or_default().chars().count() + 1;
@@ -104,11 +104,11 @@ impl Diagnostic for SceneError {
     }
 
     fn source_code(&self) -> Option<&dyn SourceCode> {
-        self.place.as_ref().map(|(source, _)| source as &dyn SourceCode)
+        self.place.as_deref().map(|(source, _)| source as &dyn SourceCode)
     }
 
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        let (_, bytes) = self.place.as_ref()?;
-        Some(Box::new(std::iter::once(LabeledSpan::new(Some("here".to_owned()), bytes.start, bytes.len()))))
+        let (_, bytes) = self.place.as_deref()?;
+        Some(Box::new(std::iter::once(LabeledSpan::new(None, bytes.start, bytes.len()))))
     }
 }

@@ -69,22 +69,23 @@ impl KeyPath {
     pub(super) fn set(&self, root: &mut Table, new: Value) -> Result<(), (String, String)> {
         let (last, way) = self.0.split_last().expect("a parsed path has at least one step");
         let mut table = root;
-        let mut steps = way.iter().peekable();
-        while let Some(step) = steps.next() {
+        let mut steps = way.iter().enumerate();
+        while let Some((mut depth, step)) = steps.next() {
             let mut here = table.entry(step.as_str()).or_insert_with(|| Value::Table(Table::new()));
             while let Value::Array(array) = here {
-                let Some(index) = steps.next() else { return element(array, step, last).map(|place| *place = new) };
-                here = element(array, step, index)?;
+                let name = way[..=depth].join(".");
+                let Some((deeper, index)) = steps.next() else {
+                    return element(array, &name, last).map(|place| *place = new);
+                };
+                here = element(array, &name, index)?;
+                depth = deeper;
             }
-            match here {
-                Value::Table(inside) => table = inside,
-                other => {
-                    return Err((
-                        format!("`{step}` is {other}, not a table, so it has no `{last}`"),
-                        format!("give all of it, as in `--set '{step}={{ {last} = ... }}'`"),
-                    ));
-                }
-            }
+            let Value::Table(inside) = here else {
+                let name = way[..=depth].join(".");
+                let what = format!("`{name}` is {here}, not a table, so it has no `{last}`");
+                return Err((what, format!("give all of it, as in `--set '{name}={{ {last} = ... }}'`")));
+            };
+            table = inside;
         }
         table.insert(last.clone(), new);
         Ok(())

@@ -172,3 +172,81 @@ fn apply(table: &mut Table, path: &Path, overrides: &Overrides) -> Result<Vec<Ov
     };
     applied.into_iter().map(put).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Friction, Interference, Radius, Source};
+    use super::*;
+
+    /// Every kind of source and surface, every form of radius, friction, shape and flow, every key.
+    const EVERYTHING: &str = include_str!("../../tests/everything.toml");
+
+    fn with(overrides: &Overrides) -> Result<SceneFile, SceneError> {
+        SceneFile::parse("all.toml".as_ref(), EVERYTHING, overrides)
+    }
+
+    fn set(texts: &[&str]) -> Overrides {
+        Overrides { set: texts.iter().map(|text| (*text).to_owned()).collect(), ..Overrides::default() }
+    }
+
+    #[test]
+    fn what_passes_the_walk_is_read_and_survives_writing() -> Result<(), SceneError> {
+        let scene = with(&Overrides::default())?.scene;
+        let written = toml::to_string(&scene).expect("a scene can be written");
+        let again = SceneFile::parse("again.toml".as_ref(), &written, &Overrides::default())?;
+        assert_eq!(again.scene, scene);
+        Ok(())
+    }
+
+    #[test]
+    fn overrides_reach_tables_arrays_and_strings() -> Result<(), SceneError> {
+        let scene = with(&set(&[
+            "source[1].count=11",
+            "source.2.cells.0=5",
+            "run.interference=none",
+            "grain.radius=0.5",
+            "contact.grain.friction.static=0.4",
+            "title=jet = two",
+            "seed=3",
+            "seed=4",
+        ]))?
+        .scene;
+        assert!(matches!(&scene.source[1], Source::Block(block) if block.count == 11));
+        assert!(matches!(&scene.source[2], Source::Lattice(lattice) if lattice.cells == [5, 2, 3]));
+        assert_eq!(scene.run.interference, Interference::None);
+        assert_eq!(scene.grain.radius, Radius::Constant(0.5));
+        let friction = scene.contact.grain.map(|contact| contact.friction);
+        assert!(matches!(friction, Some(Friction::StaticDynamic(mu)) if (mu.static_, mu.dynamic) == (0.4, 0.2)));
+        assert_eq!((scene.title.as_str(), scene.seed), ("jet = two", 4));
+        Ok(())
+    }
+
+    #[test]
+    fn seed_and_until_have_flags_of_their_own() -> Result<(), SceneError> {
+        let scene = with(&Overrides { seed: Some(9), until: Some(3.5), ..Overrides::default() })?.scene;
+        assert_eq!((scene.seed, scene.run.until), (9, 3.5));
+        Ok(())
+    }
+
+    #[test]
+    fn a_later_fault_is_blamed_on_the_override_that_gave_the_value() -> Result<(), SceneError> {
+        let file = with(&set(&["source[1].count=5"]))?;
+        let fault = |key: &str| file.locate(Invalid::new(key, "odd", "change it")).to_string();
+        let line = |text: &str| 1 + EVERYTHING[..EVERYTHING.find(text).expect("it is there")].matches('\n').count();
+        assert_eq!(fault("source[1].count"), "all.toml with `--set source[1].count=5`: source[1].count: odd");
+        let cv = format!("all.toml:{}:30: source[1].radius.cv: odd", line("cv = 0.11"));
+        assert_eq!(fault("source[1].radius.cv"), cv);
+        // A key that is not in the file is shown at its table.
+        let table = line("kind = \"lattice\"") - 1;
+        assert_eq!(fault("source[2].spin"), format!("all.toml:{table}:1: source[2].spin: odd"));
+        Ok(())
+    }
+
+    #[test]
+    fn two_flows_at_once_are_refused() {
+        let both = set(&["source[3].flow={ volume_fraction = 0.1, number_flux = 3 }"]);
+        let error = with(&both).expect_err("only one may be given");
+        assert!(error.to_string().contains("does not go with the other keys"), "{error}");
+        assert!(error.remedy().contains("give { volume_fraction } or { number_flux }"), "{}", error.remedy());
+    }
+}

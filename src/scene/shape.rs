@@ -56,7 +56,7 @@ impl<'a> Walk<'a> {
     fn table(&self, schema: &'a Schema, table: &Table, path: &str) -> Checked {
         let known = &schema["properties"];
         let names = keys(schema);
-        for name in table.keys().filter(|name| known.get(name).is_none()) {
+        if let Some(name) = table.keys().find(|name| known.get(name).is_none()) {
             return Err((unknown_key(name, &names, path), Caret::Name));
         }
         for name in schema["required"].as_array().into_iter().flatten().filter_map(Schema::as_str) {
@@ -86,12 +86,14 @@ impl<'a> Walk<'a> {
             let stray = table.keys().find(|key| best["properties"].get(key).is_none());
             if let Some(stray) = stray {
                 let names: Vec<&str> = forms.iter().flat_map(|form| keys(form)).collect();
+                let shapes = forms.iter().map(|form| self.expected(form)).collect::<Vec<_>>().join(" or ");
                 let mut fault = unknown_key(stray, &names, path);
                 if names.contains(&stray.as_str()) {
                     fault.what = format!("`{stray}` does not go with the other keys here");
+                    fault.remedy = format!("give {shapes}");
+                } else {
+                    fault.remedy = format!("{}; give {shapes}", fault.remedy);
                 }
-                let forms: Vec<String> = forms.iter().map(|form| self.expected(form)).collect();
-                fault.remedy = format!("{}; give {}", fault.remedy, forms.join(" or "));
                 return Err((fault, Caret::Name));
             }
             return Ok(best);
