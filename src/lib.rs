@@ -3,3 +3,4 @@ pub mod grains;
 pub mod law;
 pub mod scene;
 pub mod scheme;
+pub mod simulation;
