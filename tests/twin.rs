@@ -156,12 +156,8 @@ impl Twin {
             self.flights[moved] = self.flights[moved].advanced_to(time);
             self.domain.wrap(&mut self.flights[moved].position);
         }
-        let happened = |surface, impulse| Happening {
-            time: self.epoch_start + time,
-            surface,
-            ids: [i as u64, j as u64],
-            impulse,
-        };
+        let happened =
+            |surface, impulse| Happening { time: self.epoch_start + time, surface, ids: [i as u64, j as u64], impulse };
         match kind {
             0 => {
                 let apart = self.domain.nearest(self.flights[j].position - self.flights[i].position);
@@ -198,7 +194,13 @@ struct Case {
 }
 
 /// Grains at random places of `domain` that do not overlap.
-fn scatter(random: &mut Pcg64, domain: &Domain, count: usize, radius: impl Fn(&mut Pcg64) -> f64, speed: f64) -> Vec<NewGrain> {
+fn scatter(
+    random: &mut Pcg64,
+    domain: &Domain,
+    count: usize,
+    radius: impl Fn(&mut Pcg64) -> f64,
+    speed: f64,
+) -> Vec<NewGrain> {
     let mut grains: Vec<NewGrain> = Vec::new();
     while grains.len() < count {
         let radius = radius(random);
@@ -335,7 +337,9 @@ fn hundredfold(events: usize) {
     let mut grains = scatter(&mut random, &domain, 2, |_| 1.0, 0.3);
     let small = scatter(&mut random, &domain, 38, |_| 0.01, 30.0);
     let clear = |small: &&NewGrain| {
-        grains.iter().all(|big| domain.nearest(big.position - small.position).norm() > 1.1 * (big.radius + small.radius))
+        grains
+            .iter()
+            .all(|big| domain.nearest(big.position - small.position).norm() > 1.1 * (big.radius + small.radius))
     };
     let clear: Vec<NewGrain> = small.iter().filter(clear).copied().collect();
     grains.extend(clear);
@@ -368,7 +372,11 @@ fn calendar_and_observation_do_not_change_a_bit() {
     }
     let plain = run::<PlainCalendar>(&grains, domain, laws, 1);
     assert!(plain.0.0.len() > 5000);
-    for other in [run::<PlainCalendar>(&grains, domain, laws, 1), run::<Tournament>(&grains, domain, laws, 1), run::<Tournament>(&grains, domain, laws, 500)] {
+    for other in [
+        run::<PlainCalendar>(&grains, domain, laws, 1),
+        run::<Tournament>(&grains, domain, laws, 1),
+        run::<Tournament>(&grains, domain, laws, 500),
+    ] {
         assert!(other.0.0 == plain.0.0, "the events differ");
         assert!(other.1 == plain.1, "the final states differ");
     }

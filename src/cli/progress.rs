@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use impinge::scene::Run;
-use impinge::simulation::Progress;
+use impinge::scheme::Progress;
 use indicatif::{HumanCount, HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 /// How often the line changes: often enough to look alive, too seldom to cost the run anything.
