@@ -84,6 +84,12 @@ struct Side {
 /// near as this have normals that differ by less than 1e-4, so it does no harm to take the one for the other.
 const NOW: f64 = 1e-9;
 
+/// Where no contact is predicted any more, the face counts this far (in radii) beyond its border.
+///
+/// A grazing flight moves on by that much while its normal distance is rounded. Consequence: the normal of a contact with an
+/// edge is taken for that of the face where the two are within 1e-5 of each other.
+const BESIDE: f64 = 1e-5;
+
 /// Direction and length of a vector that is not zero.
 fn unit(arm: Vector3<f64>) -> Option<(Vector3<f64>, f64)> {
     let length = arm.norm();
@@ -280,7 +286,7 @@ impl Mesh {
         });
         let (normal, distance) =
             predicted.filter(|&(_, distance)| distance <= (1.0 + NOW) * sweep.radius).unwrap_or_else(|| {
-                let over_face = self.faces[number].distance_over(centre).is_some();
+                let over_face = self.faces[number].distance_over(centre, BESIDE * sweep.radius).is_some();
                 let nearest = || unit(centre - self.nearest(number, centre)).unwrap_or_else(on_face);
                 if over_face { on_face() } else { nearest() }
             });
@@ -291,7 +297,7 @@ impl Mesh {
     #[must_use]
     pub fn nearest(&self, number: usize, point: &Vector3<f64>) -> Vector3<f64> {
         let face = &self.faces[number];
-        if let Some(distance) = face.distance_over(point) {
+        if let Some(distance) = face.distance_over(point, 0.0) {
             return point - face.normal() * distance;
         }
         let corners = self.triangle(number);

@@ -36,6 +36,12 @@ const CREASE: f64 = 1.0 / (1u64 << 50) as f64;
 /// does no harm, while an edge without end would.
 const STEEPEST_GRAZING: f64 = 1e6;
 
+/// A sphere that would sink into an edge or a corner by less than this (in radii) slides past it.
+///
+/// Rounding decides whether it does, and the speed of arrival that it would see is the square root of rounding. Consequence: an
+/// overlap of 2e-15 radii.
+const SLIDING: f64 = 1.0 / (1u64 << 49) as f64;
+
 /// Triangles flatter than this (height over longest side) have no normal that could be trusted to six digits.
 const FLATTEST: f64 = 1e-10;
 
@@ -174,10 +180,10 @@ impl Face {
         point.dot(ab) <= border && point.dot(bc) - self.height <= border && point.dot(ca) <= border
     }
 
-    /// Signed distance of `point` from the plane of the face when its foot lies on the face.
-    pub(crate) fn distance_over(&self, point: &Vector3<f64>) -> Option<f64> {
+    /// Signed distance of `point` from the plane of the face when its foot lies on the face, or outside by no more than `border`.
+    pub(crate) fn distance_over(&self, point: &Vector3<f64>, border: f64) -> Option<f64> {
         let start = point - self.origin;
-        self.covers(&start, BORDER * start.amax()).then(|| start.dot(&self.normal))
+        self.covers(&start, border).then(|| start.dot(&self.normal))
     }
 
     /// Unit vector from the plane of the face to `point`, exactly along the normal, and their distance.
@@ -284,7 +290,7 @@ fn round_contact(r: &Vector3<f64>, v: &Vector3<f64>, sweep: &Sweep) -> Option<f6
         }
         let speed = v.norm();
         let miss = r.cross(v).norm() / speed;
-        if miss <= s {
+        if miss <= s * (1.0 - SLIDING) {
             return Some((distance - s) * (distance + s) / (approach + speed * ((s - miss) * (s + miss)).sqrt()));
         }
     }
