@@ -11,7 +11,7 @@ fn sheet(n: usize, seed: u64, place: impl Fn(f64, f64) -> Vector3<f64>) -> Mesh 
     let mut state = seed;
     let mut shift = || {
         state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        ((state >> 33) as f64 / (1u64 << 31) as f64 - 0.5) * 0.8
+        ((state >> 33) as f64 / (1u64 << 31) as f64 - 0.5) * 0.4
     };
     let mut vertices = Vec::new();
     for i in 0..=n {
