@@ -62,8 +62,8 @@ pub struct Sweep {
     slowest: f64,
     /// When it sets off, s.
     start: f64,
-    /// Units of time in a second.
-    pace: f64,
+    /// Seconds in a unit of time.
+    unit: f64,
 }
 
 /// Below this speed (m/s) its square and the products of the root could underflow.
@@ -81,15 +81,15 @@ impl Sweep {
     #[must_use]
     pub fn new(flight: &Flight, speeds: f64) -> Self {
         let speed = flight.velocity.amax();
-        let pace = if speed < SLOWEST_SPEED { slow_pace(speed) } else { 1.0 };
+        let unit = if speed < SLOWEST_SPEED { slow_unit(speed) } else { 1.0 };
         Self {
             position: flight.position,
-            velocity: flight.velocity / pace,
+            velocity: flight.velocity * unit,
             radius: flight.radius,
-            speed: speed / pace,
-            slowest: APPROACH_ROUNDING * speeds / pace,
+            speed: speed * unit,
+            slowest: APPROACH_ROUNDING * speeds * unit,
             start: flight.time,
-            pace,
+            unit,
         }
     }
 
@@ -97,13 +97,13 @@ impl Sweep {
     #[inline]
     #[must_use]
     pub fn time(&self, interval: f64) -> f64 {
-        self.start + interval / self.pace
+        self.start + interval * self.unit
     }
 }
 
 #[cold]
-fn slow_pace(speed: f64) -> f64 {
-    if speed > 0.0 { 2f64.powi(speed.log2().floor().clamp(-960.0, 0.0) as i32) } else { 1.0 }
+fn slow_unit(speed: f64) -> f64 {
+    if speed > 0.0 { 2f64.powi((-speed.log2()).floor().clamp(0.0, 960.0) as i32) } else { 1.0 }
 }
 
 /// The face of a triangle, hit from both sides.
