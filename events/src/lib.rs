@@ -37,10 +37,12 @@ pub mod contact_time;
 mod domain;
 mod encounters;
 mod flight;
+mod mesh;
 mod neighbors;
 mod surface;
 
 pub use domain::Domain;
 pub use encounters::{Encounter, Encounters};
 pub use flight::Flight;
+pub use mesh::{BadTriangle, Mesh};
 pub use surface::{NoSurface, Outlook, Surface, SurfaceContact};
