@@ -2,3 +2,4 @@
 pub mod grains;
 pub mod scene;
 pub mod scheme;
+pub mod source;
