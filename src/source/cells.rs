@@ -1,15 +1,15 @@
-//! Which placed grains are near a point? A grid of hashed cells, so that placing and checking N grains costs O(N).
+//! Which placed grains are near a point? A grid of cells, so that placing and checking N grains costs O(N).
 //!
 //! Grains are sorted into classes of radius, each class twice as wide as the next smaller one and with cells of its own:
-//! dust between boulders does not have to be sought in cells of the size of boulders. Memory follows the grains, not the
-//! domain.
+//! dust between boulders does not have to be sought in cells of the size of boulders. Cells are
+//! hashed into a table whose size follows the grains, not the domain. Different cells may share a slot of the table; that
+//! only shows a few grains too many, and all that are shown are measured.
 
 use nalgebra::Vector3;
-use rustc_hash::FxHashMap;
 
 use crate::scene::{Boundary, Domain};
 
-/// A placed grain, in the order of insertion within its cell.
+/// A placed grain.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Item {
     /// Id of the grain.
@@ -17,17 +17,24 @@ pub(super) struct Item {
     /// Radius, m.
     pub(super) radius: f64,
     position: Vector3<f64>,
-    /// The next item of the same cell, or `NONE`.
+    /// Hash of its cell.
+    hash: u64,
+    /// The next item of the same slot, or `NONE`.
     next: u32,
 }
 
 const NONE: u32 = u32::MAX;
+
+/// Slots of the table per grain, at least: more of them show fewer grains of other cells, but take more memory.
+const SLOTS_PER_GRAIN: usize = 4;
 
 /// Grains whose radius lies in (reach / 2, reach].
 #[derive(Debug)]
 struct Class {
     exponent: i32,
     reach: f64,
+    /// Start of the hashes of its cells.
+    salt: u64,
     /// Sides of a cell, m; at least 2 reach, so that partners of equal size are at most one cell away.
     side: Vector3<f64>,
     /// Cells around a periodic axis; 0 along an open one.
@@ -45,7 +52,8 @@ pub(super) struct Cells {
     /// Upper edge of class 0: the radius of the first grain.
     unit: f64,
     classes: Vec<Class>,
-    heads: FxHashMap<[i64; 4], u32>,
+    /// The first item of each slot; a power of two of them.
+    slots: Vec<u32>,
     items: Vec<Item>,
 }
 
@@ -62,7 +70,7 @@ impl Cells {
             planar: domain.planar,
             unit: 0.0,
             classes: Vec::new(),
-            heads: FxHashMap::default(),
+            slots: vec![NONE; 64],
             items: Vec::new(),
         }
     }
@@ -72,19 +80,27 @@ impl Cells {
         self.period
     }
 
-    /// Upper bound of all radii so far, m.
-    pub(super) fn largest_radius(&self) -> f64 {
-        self.classes.iter().fold(0.0, |largest, class| largest.max(class.reach))
-    }
-
     /// Adds a grain.
     pub(super) fn insert(&mut self, id: u32, position: Vector3<f64>, radius: f64) {
-        let class = self.class_for(radius);
-        let key = self.key(class, position);
+        let number = self.class_for(radius);
+        let class = &self.classes[number];
+        let cell = |axis: usize| self.cell_range(class, axis, position[axis], position[axis]).start;
+        let hash = (0..3).fold(class.salt, |hash, axis| hash.wrapping_add(cell_hash(class, axis, cell(axis))));
         let index = u32::try_from(self.items.len()).expect("MOST_GRAINS is far below 2^32");
-        let next = self.heads.insert(key, index).unwrap_or(NONE);
-        self.items.push(Item { id, radius, position, next });
-        self.classes[class].members.push(index);
+        self.classes[number].members.push(index);
+        self.items.push(Item { id, radius, position, hash, next: NONE });
+        if self.items.len() * SLOTS_PER_GRAIN > self.slots.len() {
+            self.slots = vec![NONE; 2 * self.slots.len()];
+            (0..self.items.len()).for_each(|index| self.link(index));
+        } else {
+            self.link(index as usize);
+        }
+    }
+
+    /// Puts an item at the head of its slot.
+    fn link(&mut self, index: usize) {
+        let slot = self.slot(self.items[index].hash);
+        self.items[index].next = std::mem::replace(&mut self.slots[slot], index as u32);
     }
 
     /// Whether a grain of this radius overlaps nothing here.
@@ -101,27 +117,28 @@ impl Cells {
         radius: f64,
         mut test: impl FnMut(&Item, Vector3<f64>) -> bool,
     ) -> bool {
-        let mut show = |index: u32| {
-            let item = &self.items[index as usize];
-            test(item, self.nearest_image(item.position - centre))
-        };
-        self.classes.iter().enumerate().any(|(number, class)| {
+        let mut show = |item: &Item| test(item, self.nearest_image(item.position - centre));
+        self.classes.iter().any(|class| {
             let reach = radius + class.reach;
             let [x, y, z] =
                 [0, 1, 2].map(|axis| self.cell_range(class, axis, centre[axis] - reach, centre[axis] + reach));
-            let cells = [&x, &y, &z].map(|range| (range.end - range.start) as f64).iter().product::<f64>();
+            let cells: f64 = [&x, &y, &z].map(|range| (range.end - range.start) as f64).iter().product();
             if cells >= class.members.len() as f64 {
-                return class.members.iter().any(|&index| show(index));
+                return class.members.iter().any(|&index| show(&self.items[index as usize]));
             }
             for i in x {
+                let hash_x = class.salt.wrapping_add(cell_hash(class, 0, i));
                 for j in y.clone() {
+                    let hash_xy = hash_x.wrapping_add(cell_hash(class, 1, j));
                     for k in z.clone() {
-                        let mut index = self.head(number, class, [i, j, k]);
+                        let hash = hash_xy.wrapping_add(cell_hash(class, 2, k));
+                        let mut index = self.slots[self.slot(hash)];
                         while index != NONE {
-                            if show(index) {
+                            let item = &self.items[index as usize];
+                            if item.hash == hash && show(item) {
                                 return true;
                             }
-                            index = self.items[index as usize].next;
+                            index = item.next;
                         }
                     }
                 }
@@ -162,7 +179,8 @@ impl Cells {
         if self.planar {
             count[1] = 1;
         }
-        Class { exponent, reach, side, count, members: Vec::new() }
+        let salt = (exponent as u64).wrapping_mul(MULTIPLIERS[3]);
+        Class { exponent, reach, salt, side, count, members: Vec::new() }
     }
 
     /// The cells that the interval meets along `axis`, each once.
@@ -173,22 +191,25 @@ impl Cells {
         if count > 0 && last.saturating_sub(first) >= count - 1 { 0..count } else { first..last.saturating_add(1) }
     }
 
-    fn key(&self, class: usize, position: Vector3<f64>) -> [i64; 4] {
-        let cell = |axis: usize| self.cell_range(&self.classes[class], axis, position[axis], position[axis]).start;
-        wrapped(class, &self.classes[class], [cell(0), cell(1), cell(2)])
-    }
-
-    fn head(&self, number: usize, class: &Class, cell: [i64; 3]) -> u32 {
-        self.heads.get(&wrapped(number, class, cell)).copied().unwrap_or(NONE)
+    fn slot(&self, hash: u64) -> usize {
+        (hash >> 32) as usize & (self.slots.len() - 1)
     }
 }
 
-fn wrapped(number: usize, class: &Class, cell: [i64; 3]) -> [i64; 4] {
-    let wrap = |axis: usize| match class.count[axis] {
-        0 => cell[axis],
-        count => cell[axis].rem_euclid(count),
+/// Odd numbers whose multiples differ in their upper bits, one for each axis and one for the classes.
+const MULTIPLIERS: [u64; 4] =
+    [0x9e37_79b9_7f4a_7c15, 0xc2b2_ae3d_27d4_eb4f, 0xd6e8_feb8_6659_fd93, 0xa076_1d64_78bd_642f];
+
+/// What a cell's number along `axis` adds to its hash. Around a periodic axis the numbers go on beyond both ends.
+fn cell_hash(class: &Class, axis: usize, cell: i64) -> u64 {
+    let count = class.count[axis];
+    let wrapped = match cell {
+        _ if count == 0 => cell,
+        _ if cell < 0 => cell + count,
+        _ if cell >= count => cell - count,
+        _ => cell,
     };
-    [number as i64, wrap(0), wrap(1), wrap(2)]
+    (wrapped as u64).wrapping_mul(MULTIPLIERS[axis])
 }
 
 #[cfg(test)]

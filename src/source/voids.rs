@@ -52,6 +52,8 @@ pub(super) struct Voids {
     asleep: BTreeMap<usize, Vec<(usize, Vector3<f64>)>>,
     /// Voxels whose longest side is at most this are given up, m.
     finest: f64,
+    /// Grains near the voxel at hand: where from its centre (m), and radius (m).
+    near: Vec<(Vector3<f64>, f64)>,
 }
 
 impl Voids {
@@ -61,7 +63,7 @@ impl Voids {
         let smallest = radii.last().copied().unwrap_or(0.0);
         let finest = (FINEST_VOXEL * smallest).max(ROUNDING * bounds.lower.amax().max(bounds.upper.amax()));
         let levels = vec![Level { side, volume: 1.0, corners: vec![bounds.lower] }];
-        Self { bounds, walls, radii, levels, asleep: BTreeMap::new(), finest }
+        Self { bounds, walls, radii, levels, asleep: BTreeMap::new(), finest, near: Vec::new() }
     }
 
     /// A free place for grain number `turn` (they must come in order) among those in `cells`, or `None` if there is none.
@@ -116,51 +118,73 @@ impl Voids {
             let volume = self.levels[level].volume * 0.5f64.powi(parts);
             self.levels.push(Level { side: half, volume, corners: Vec::new() });
         }
+        let middle = corner + 0.5 * side;
+        self.gather(middle, 0.5 * half, turn, cells);
         for part in 0..8 {
             let is_upper = |axis: usize| part >> axis & 1 == 1;
             if (0..3).all(|axis| is_cut(axis) || !is_upper(axis)) {
                 let shift = Vector3::from_fn(|axis, _| if is_upper(axis) { half[axis] } else { 0.0 });
-                self.file(level + 1, corner + shift, turn, cells);
+                self.file(level + 1, corner + shift, middle, turn);
             }
         }
     }
 
+    /// Collects the grains that could cover a voxel whose centre is at most `shift` away from `middle` along each axis.
+    fn gather(&mut self, middle: Vector3<f64>, shift: Vector3<f64>, turn: usize, cells: &Cells) {
+        let reach = self.radii[turn] + shift.norm();
+        self.near.clear();
+        cells.any_near(middle, reach, |item, offset| {
+            if offset.norm_squared() < (item.radius + reach).powi(2) {
+                self.near.push((offset, item.radius));
+            }
+            false
+        });
+    }
+
     /// Puts a voxel where it belongs: among those to draw from, among those asleep, or nowhere.
-    fn file(&mut self, level: usize, corner: Vector3<f64>, turn: usize, cells: &Cells) {
-        let threshold = self.covering_radius(level, corner, turn, cells);
-        let opens = self.radii.partition_point(|&radius| radius > threshold);
-        if opens <= turn {
-            self.levels[level].corners.push(corner);
-        } else if opens < self.radii.len() {
-            self.asleep.entry(opens).or_default().push((level, corner));
+    ///
+    /// The grains near `middle`, no matter whether that is its own centre or a neighbour's, must have been gathered.
+    fn file(&mut self, level: usize, corner: Vector3<f64>, middle: Vector3<f64>, turn: usize) {
+        match self.covering_radius(level, corner, middle, turn) {
+            None => self.levels[level].corners.push(corner),
+            Some(covering) => {
+                let opens = self.radii.partition_point(|&radius| radius > covering);
+                if opens < self.radii.len() {
+                    self.asleep.entry(opens).or_default().push((level, corner));
+                }
+            }
         }
     }
 
-    /// Grains larger than this (m) cannot have their centre in the voxel. Exact where it is less than the present radius.
-    fn covering_radius(&self, level: usize, corner: Vector3<f64>, turn: usize, cells: &Cells) -> f64 {
+    /// Where the voxel is wholly covered for the present radius: larger grains than this (m) find no place in it.
+    fn covering_radius(&self, level: usize, corner: Vector3<f64>, middle: Vector3<f64>, turn: usize) -> Option<f64> {
         let side = self.levels[level].side;
-        let (radius, smallest) = (self.radii[turn], self.radii[self.radii.len() - 1]);
-        let mut threshold = f64::INFINITY;
+        let (present, smallest) = (self.radii[turn], self.radii[self.radii.len() - 1]);
+        let mut covering = present;
         if let Some(walls) = self.walls {
-            let farthest = (corner + side - walls.lower).inf(&(walls.upper - corner));
-            threshold = farthest.min();
+            covering = covering.min((corner + side - walls.lower).inf(&(walls.upper - corner)).min());
         }
-        let half = 0.5 * side;
-        if half.norm() < cells.largest_radius() + radius {
+        let from_centre = middle - (corner + 0.5 * side);
+        for (offset, radius) in &self.near {
             // A grain covers the voxel if it forbids the corner that is farthest from it.
-            cells.any_near(corner + half, radius, |item, offset| {
-                threshold = threshold.min((offset.abs() + half).norm() - item.radius);
-                threshold < smallest
-            });
+            let farthest = ((offset + from_centre).abs() + 0.5 * side).norm_squared();
+            if farthest < (covering + radius).powi(2) {
+                covering = farthest.sqrt() - radius;
+                if covering < smallest {
+                    break; // no grain to come will open it
+                }
+            }
         }
-        threshold
+        (covering < present).then_some(covering)
     }
 
     /// Takes up the voxels that may have opened by now. They are looked at again: grains have been added since.
     fn wake(&mut self, turn: usize, cells: &Cells) {
         while let Some(entry) = self.asleep.first_entry().filter(|entry| *entry.key() <= turn) {
             for (level, corner) in entry.remove() {
-                self.file(level, corner, turn, cells);
+                let middle = corner + 0.5 * self.levels[level].side;
+                self.gather(middle, Vector3::zeros(), turn, cells);
+                self.file(level, corner, middle, turn);
             }
         }
     }
