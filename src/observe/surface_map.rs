@@ -71,7 +71,7 @@ pub struct SurfaceMap {
 impl SurfaceMap {
     /// A map of no hits; cells on planes are `finest` (m) wide at first.
     ///
-    /// Cells smaller than a grain show nothing but noise, so take its diameter.
+    /// Cells smaller than a grain show nothing but noise, so take its radius.
     #[must_use]
     pub fn new(shape: &SurfaceShape, finest: f64) -> Self {
         Self { elements: Vec::new(), planes: shape.planes.iter().map(|plane| PlaneMap::new(plane, finest)).collect() }
@@ -120,8 +120,8 @@ pub struct PlaneMap {
 }
 
 impl PlaneMap {
-    /// At most so many cells along each side: fine enough to look smooth, few enough to draw and to keep.
-    pub const MAX_CELLS: i64 = 96;
+    /// At most so many cells along each side: a footprint of a tenth of the spray is still told in detail; 10 MB at most.
+    pub const MAX_CELLS: i64 = 512;
 
     fn new(shape: &PlaneShape, finest: f64) -> Self {
         let axes = axes_along(&shape.normal);
@@ -151,6 +151,11 @@ impl PlaneMap {
     #[must_use]
     pub fn extent(&self) -> Option<([i64; 2], [i64; 2])> {
         (!self.cells.is_empty()).then_some((self.low, self.high))
+    }
+
+    /// The cells that were hit, in no order.
+    pub fn cells(&self) -> impl Iterator<Item = ([i64; 2], Tally)> {
+        self.cells.iter().map(|(&cell, &tally)| (cell, tally))
     }
 
     /// Hits in a cell.
@@ -229,7 +234,7 @@ mod tests {
         }
         let plane = &map.planes()[0];
         let (low, high) = plane.extent().unwrap();
-        assert_eq!(plane.width(), 0.16); // 10 m / 96 cells, rounded up to 0.01 m times a power of 2
+        assert_eq!(plane.width(), 0.02); // 10 m / 512 cells, rounded up to 0.01 m times a power of 2
         assert!(high[0] - low[0] < PlaneMap::MAX_CELLS);
         let all = (low[0]..=high[0]).flat_map(|x| (low[1]..=high[1]).map(move |y| [x, y]));
         let (hits, energy) =

@@ -81,7 +81,7 @@ impl Recorder {
             scene: scene.clone(),
             ledger: Ledger::default(),
             surface: SurfaceEnergy::default(),
-            map: SurfaceMap::new(&shape, 2.0 * mean_radius),
+            map: SurfaceMap::new(&shape, mean_radius),
             history: History::default(),
             side_view: SideView::new(scene),
             events,

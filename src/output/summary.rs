@@ -300,7 +300,8 @@ impl Summary {
     fn heading(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let title = if self.title.is_empty() { "Untitled scene" } else { &self.title };
         writeln!(f, "{title}")?;
-        let [start, reached, until] = [self.time.start, self.time.reached, self.time.until].map(|t| quantity(t, "s"));
+        let [start, reached, until] =
+            [self.time.start, self.time.reached, self.time.until].map(|time| brief(time, "s"));
         let ended = if self.interrupted { format!("stopped at {reached} of {until}") } else { format!("to {reached}") };
         writeln!(f, "from {start} {ended}, seed {}, Impinge {}\n", self.seed, self.version)
     }
@@ -388,6 +389,17 @@ pub(super) fn quantity(value: f64, unit: &str) -> String {
     // Rounding to four digits must not show 1000 where the next prefix would show 1.
     let digits = if scaled == 0.0 { 0 } else { (3 - scaled.abs().log10().floor() as i32).clamp(0, 3) as usize };
     format!("{scaled:.digits$} {}{unit}", prefix.symbol)
+}
+
+/// The same without zeros at the end: `60 ms`.
+pub(super) fn brief(value: f64, unit: &str) -> String {
+    let text = quantity(value, unit);
+    match text.split_once(' ') {
+        Some((number, unit)) if number.contains('.') => {
+            format!("{} {unit}", number.trim_end_matches('0').trim_end_matches('.'))
+        }
+        _ => text,
+    }
 }
 
 /// A prefix of SI.
@@ -478,6 +490,7 @@ mod tests {
     fn quantities_have_four_digits_and_a_prefix() {
         let shown = [911_392.3, 0.06, 999.96, 0.0, -1.5e-5, 1.0, 25.0, 1e20].map(|value| quantity(value, "J"));
         assert_eq!(shown, ["911.4 kJ", "60.00 mJ", "1.000 kJ", "0 J", "-15.00 µJ", "1.000 J", "25.00 J", "100000 PJ"]);
+        assert_eq!([0.06, 0.0, 10.0, 1.5].map(|value| brief(value, "s")), ["60 ms", "0 s", "10 s", "1.5 s"]);
         assert_eq!([0, 999, 1000, 1_234_567].map(grouped), ["0", "999", "1 000", "1 234 567"]);
     }
 }

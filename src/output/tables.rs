@@ -16,11 +16,19 @@ fn table<const N: usize, R: Serialize>(
     rows: impl Iterator<Item = R>,
 ) -> io::Result<()> {
     let mut table = csv::WriterBuilder::new().has_headers(false).from_writer(out);
-    table.write_record(header)?;
+    table.write_record(header).map_err(cause)?;
     for row in rows {
-        table.serialize(row)?;
+        table.serialize(row).map_err(cause)?;
     }
     table.flush()
+}
+
+/// The error of the file beneath the table: a full disk shall be told from a missing permission.
+fn cause(error: csv::Error) -> io::Error {
+    match error.into_kind() {
+        csv::ErrorKind::Io(error) => error,
+        other => io::Error::other(format!("{other:?}")),
+    }
 }
 
 /// `grains.csv`: all grains of a snapshot.
@@ -84,7 +92,7 @@ impl<W: Write> EventTable<W> {
         let mut table = csv::WriterBuilder::new().has_headers(false).from_writer(out);
         let header =
             ["time", "kind", "a", "b", "impulse_normal", "impulse_tangential", "approach_speed", "x", "y", "z"];
-        table.write_record(header)?;
+        table.write_record(header).map_err(cause)?;
         Ok(Self { table, error: None })
     }
 
@@ -106,7 +114,7 @@ impl<W: Write> EventTable<W> {
 
     fn row(&mut self, row: impl Serialize) {
         if self.error.is_none() {
-            self.error = self.table.serialize(row).err().map(io::Error::from);
+            self.error = self.table.serialize(row).err().map(cause);
         }
     }
 }
@@ -174,7 +182,7 @@ mod tests {
             }
         }
         let (mut bytes, mut count) = (Vec::new(), Count::default());
-        let jet = FakeJet { grains: 100, ..FakeJet::default() };
+        let jet = FakeJet { grains: 500, ..FakeJet::default() };
         let mut events = EventTable::new(&mut bytes).unwrap();
         jet.run(&mut events);
         events.finish().unwrap();

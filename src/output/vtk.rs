@@ -220,12 +220,14 @@ impl Facets {
         let Some((low, high)) = plane.extent() else {
             return self.add(plane.shape.element, patch_over(plane, domain), Tally::default());
         };
-        // One empty cell all round shows where the hits end.
+        // One empty row all round shows where the hits end. Empty cells that follow each other are drawn as one.
         for x in low[0] - 1..=high[0] + 1 {
-            for y in low[1] - 1..=high[1] + 1 {
-                let corner = |dx: f64, dy: f64| plane.place([x as f64 + dx, y as f64 + dy]);
-                let corners = [corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)];
-                self.add(plane.shape.element, corners, plane.cell([x, y]));
+            let row: Vec<i64> = (low[1] - 1..=high[1] + 1).collect();
+            for run in row.chunk_by(|&y, &next| plane.cell([x, y]).hits == 0 && plane.cell([x, next]).hits == 0) {
+                let (bottom, top) = (run[0] as f64, (run[0] + run.len() as i64) as f64);
+                let (left, right) = (x as f64, (x + 1) as f64);
+                let corners = [[left, bottom], [right, bottom], [right, top], [left, top]].map(|at| plane.place(at));
+                self.add(plane.shape.element, corners, plane.cell([x, run[0]]));
             }
         }
     }

@@ -11,7 +11,7 @@ use crate::output::summary::{Prefix, quantity};
 
 const SIZE: [i32; 2] = [900, 520];
 /// Where the key begins, right of the curves, pixels.
-const KEY: i32 = 690;
+const KEY: i32 = 665;
 
 struct Curve {
     name: &'static str,
@@ -60,8 +60,8 @@ fn draw_curves(area: &super::Area<'_>, curves: &[Curve], time: &str) -> Drawn {
     let (start, end) = points().fold((f64::MAX, f64::MIN), |range, point| (range.0.min(point.0), range.1.max(point.0)));
     let top = 1.05 * points().map(|point| point.1).fold(0.0, f64::max);
     let mut chart = ChartBuilder::on(&part(area, [10, HEADING, KEY - 20, SIZE[1] - HEADING - 10]))
-        .set_label_area_size(LabelAreaPosition::Left, fine(62))
-        .set_label_area_size(LabelAreaPosition::Bottom, fine(46))
+        .set_label_area_size(LabelAreaPosition::Left, fine(58))
+        .set_label_area_size(LabelAreaPosition::Bottom, fine(40))
         .margin_top(fine(10))
         .build_cartesian_2d(start..end, 0.0..top)?;
     chart
@@ -70,8 +70,8 @@ fn draw_curves(area: &super::Area<'_>, curves: &[Curve], time: &str) -> Drawn {
         .light_line_style(TRANSPARENT)
         .bold_line_style(FAINT.stroke_width(fine(1)))
         .axis_style(INK.stroke_width(fine(1)))
-        .label_style(style(13, INK, (HPos::Left, VPos::Top)))
-        .axis_desc_style(style(14, INK, (HPos::Left, VPos::Top)))
+        .label_style(style(12, INK, (HPos::Left, VPos::Top)))
+        .axis_desc_style(style(13, INK, (HPos::Left, VPos::Top)))
         .set_all_tick_mark_size(fine(4))
         .x_labels(8)
         .y_labels(8)
@@ -89,13 +89,13 @@ fn draw_curves(area: &super::Area<'_>, curves: &[Curve], time: &str) -> Drawn {
 /// The key, in the order in which the curves end, and where they end.
 fn draw_key(area: &super::Area<'_>, mut curves: Vec<Curve>) -> Drawn {
     curves.sort_by(|a, b| b.last().total_cmp(&a.last()));
-    write(area, "at the end", [SIZE[0] - 20, HEADING + 12], 13, MUTED, (HPos::Right, VPos::Center))?;
+    write(area, "at the end", [SIZE[0] - 20, HEADING + 12], 12, MUTED, (HPos::Right, VPos::Center))?;
     for (row, curve) in curves.iter().enumerate() {
         let y = HEADING + 40 + 28 * row as i32;
         let line = [(KEY * FINE, y * FINE), ((KEY + 22) * FINE, y * FINE)];
         area.draw(&PathElement::new(line, curve.colour.stroke_width(fine(3))))?;
-        write(area, curve.name, [KEY + 30, y], 14, INK, (HPos::Left, VPos::Center))?;
-        write(area, &format!("{:.3}", curve.last()), [SIZE[0] - 20, y], 14, INK, (HPos::Right, VPos::Center))?;
+        write(area, curve.name, [KEY + 30, y], 13, INK, (HPos::Left, VPos::Center))?;
+        write(area, &format!("{:.3}", curve.last()), [SIZE[0] - 20, y], 13, INK, (HPos::Right, VPos::Center))?;
     }
     Ok(())
 }

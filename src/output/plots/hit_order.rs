@@ -67,7 +67,7 @@ fn draw_bars(area: &Area<'_>, bars: &[Bar]) -> Drawn {
     let highest = bars.iter().map(|bar| bar.parts.iter().sum()).fold(0.0, f64::max);
     let top = if highest > 0.0 { 1.12 * highest } else { 1.0 };
     let mut chart = ChartBuilder::on(&part(area, [10, HEADING, SIZE[0] - 20, SIZE[1] - HEADING - 10]))
-        .set_label_area_size(LabelAreaPosition::Left, fine(66))
+        .set_label_area_size(LabelAreaPosition::Left, fine(58))
         .set_label_area_size(LabelAreaPosition::Bottom, fine(64))
         .margin_top(fine(10))
         .build_cartesian_2d(0.0..bars.len() as f64, 0.0..top)?;
@@ -78,8 +78,8 @@ fn draw_bars(area: &Area<'_>, bars: &[Bar]) -> Drawn {
         .light_line_style(TRANSPARENT)
         .bold_line_style(FAINT.stroke_width(fine(1)))
         .axis_style(INK.stroke_width(fine(1)))
-        .label_style(style(13, INK, (HPos::Left, VPos::Top)))
-        .axis_desc_style(style(14, INK, (HPos::Left, VPos::Top)))
+        .label_style(style(12, INK, (HPos::Left, VPos::Top)))
+        .axis_desc_style(style(13, INK, (HPos::Left, VPos::Top)))
         .set_all_tick_mark_size(fine(4))
         .y_labels(8)
         .y_label_formatter(&|value| tick(*value))
@@ -94,16 +94,16 @@ fn draw_bars(area: &Area<'_>, bars: &[Bar]) -> Drawn {
             level += part;
         }
         let (x, y) = chart.backend_coord(&(middle, level));
-        area.draw_text(&share(level), &style(13, INK, (HPos::Center, VPos::Bottom)), (x, y - 5 * FINE))?;
+        area.draw_text(&share(level), &style(12, INK, (HPos::Center, VPos::Bottom)), (x, y - 5 * FINE))?;
         let foot = chart.backend_coord(&(middle, 0.0)).1;
-        area.draw_text(&bar.name, &style(14, INK, (HPos::Center, VPos::Top)), (x, foot + 6 * FINE))?;
+        area.draw_text(&bar.name, &style(13, INK, (HPos::Center, VPos::Top)), (x, foot + 6 * FINE))?;
         area.draw_text(&grouped(bar.hits), &style(12, MUTED, (HPos::Center, VPos::Top)), (x, foot + 25 * FINE))?;
     }
     write(
         area,
         "hit order; below it, how many hits",
         [SIZE[0] / 2, SIZE[1] - 14],
-        14,
+        13,
         INK,
         (HPos::Center, VPos::Bottom),
     )
@@ -121,8 +121,8 @@ fn draw_key(area: &Area<'_>, bars: &[Bar]) -> Drawn {
     for (row, (index, (name, colour))) in shown.enumerate() {
         let [x, y] = [SIZE[0] - 200, 30 + 20 * row as i32];
         area.draw(&Rectangle::new([(x * FINE, (y - 6) * FINE), ((x + 12) * FINE, (y + 6) * FINE)], colour.filled()))?;
-        write(area, name, [x + 20, y], 14, INK, (HPos::Left, VPos::Center))?;
-        write(area, &share(total(index)), [SIZE[0] - 20, y], 14, INK, (HPos::Right, VPos::Center))?;
+        write(area, name, [x + 20, y], 13, INK, (HPos::Left, VPos::Center))?;
+        write(area, &share(total(index)), [SIZE[0] - 20, y], 13, INK, (HPos::Right, VPos::Center))?;
     }
     Ok(())
 }

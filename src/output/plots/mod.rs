@@ -24,6 +24,7 @@ const FINE: i32 = 10;
 
 const INK: RGBColor = RGBColor(0x22, 0x22, 0x22);
 const MUTED: RGBColor = RGBColor(0x66, 0x66, 0x66);
+const FRAME: RGBColor = RGBColor(0x99, 0x99, 0x99);
 const FAINT: RGBColor = RGBColor(0xdd, 0xdd, 0xdd);
 // Colours that colour-blind readers can tell apart (Okabe & Ito 2008).
 const BLUE: RGBColor = RGBColor(0x00, 0x72, 0xb2);
@@ -46,6 +47,8 @@ fn picture(size: [i32; 2], title: &str, shows: &str, draw: impl FnOnce(&Area<'_>
     // Shown at its size in pixels; and without what is the default anyway, which is half of a picture of many grains.
     let sized = |[width, height]: [i32; 2]| format!(r#"width="{width}" height="{height}""#);
     let shown = svg.replacen(&sized(size.map(|length| length * FINE)), &sized(size), 1);
+    // Rectangles that touch must not show the paper between them.
+    let shown = shown.replacen('>', "><style>rect{shape-rendering:crispEdges}</style>", 1);
     Ok(shown
         .replace(r#" opacity="1""#, "")
         .replace(r#" stroke="none" stroke-width="1""#, "")
@@ -65,8 +68,8 @@ fn compose(
     if title.chars().count() > TITLE_LENGTH {
         title = title.chars().take(TITLE_LENGTH - 1).chain(['…']).collect();
     }
-    write(&root, &title, [20, 14], 18, INK, (HPos::Left, VPos::Top))?;
-    write(&root, shows, [20, 38], 14, MUTED, (HPos::Left, VPos::Top))?;
+    write(&root, &title, [20, 14], 17, INK, (HPos::Left, VPos::Top))?;
+    write(&root, shows, [20, 38], 13, MUTED, (HPos::Left, VPos::Top))?;
     draw(&root)?;
     root.present()
 }
@@ -77,7 +80,9 @@ fn fine(pixels: i32) -> u32 {
 }
 
 fn style(size: i32, colour: RGBColor, (across, up): (HPos, VPos)) -> TextStyle<'static> {
-    let font = ("sans-serif", size * FINE).into_font();
+    /// Plotters divides the size of a font by this on its way into SVG.
+    const SHRINK: f64 = 1.24;
+    let font = ("sans-serif", f64::from(size * FINE) * SHRINK).into_font();
     TextStyle { font, color: colour.to_backend_color(), pos: Pos::new(across, up) }
 }
 
@@ -113,7 +118,7 @@ fn colour_bar(area: &Area<'_>, [left, top, width, height]: [i32; 4], most: f64, 
         let level = |step: i32| (top + height) * FINE - height * FINE * step / SHADES;
         let colour = colour_of((f64::from(shade) + 0.5) / f64::from(SHADES));
         area.draw(&Rectangle::new(
-            [(left * FINE, level(shade + 1)), ((left + width) * FINE, level(shade))],
+            [(left * FINE, level(SHADES)), ((left + width) * FINE, level(shade))], // up to the end: no seams
             colour.filled(),
         ))?;
     }
@@ -121,7 +126,7 @@ fn colour_bar(area: &Area<'_>, [left, top, width, height]: [i32; 4], most: f64, 
         let y = (top + height) * FINE - (f64::from(height * FINE) * value / most).round() as i32;
         let right = (left + width) * FINE;
         area.draw(&PathElement::new([(right, y), (right + 4 * FINE, y)], INK.stroke_width(FINE as u32)))?;
-        area.draw_text(&tick(value), &style(13, INK, (HPos::Left, VPos::Center)), (right + 8 * FINE, y))?;
+        area.draw_text(&tick(value), &style(12, INK, (HPos::Left, VPos::Center)), (right + 8 * FINE, y))?;
     }
     write(area, label, [left, top - 12], 13, INK, (HPos::Left, VPos::Bottom))
 }

@@ -8,10 +8,10 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
 use super::raster::{Block, Raster};
-use super::{Area, Drawn, FINE, HEADING, INK, colour_bar, colour_of, fine, part, picture, style, tick, write};
+use super::{Area, Drawn, FINE, FRAME, HEADING, INK, colour_bar, colour_of, fine, part, picture, style, tick, write};
 use crate::grains::Snapshot;
 use crate::observe::SurfaceShape;
-use crate::output::summary::{Prefix, quantity};
+use crate::output::summary::{Prefix, brief};
 use crate::scene::{Domain, Scene};
 use crate::scheme::Observer;
 
@@ -24,9 +24,9 @@ const STRAGGLERS: f64 = 0.01;
 /// Room for all panels together, pixels.
 const ROOM: [f64; 2] = [1040.0, 720.0];
 /// Room for the labels left of the panels, pixels.
-const LEFT: i32 = 70;
+const LEFT: i32 = 64;
 /// Room for the labels below the panels, pixels.
-const BOTTOM: i32 = 52;
+const BOTTOM: i32 = 42;
 /// Room for the caption over each panel, pixels.
 const CAPTION: i32 = 24;
 /// Room between two panels, pixels.
@@ -110,12 +110,13 @@ impl View {
         let (across, towards) = direction(flights(), side_view.domain.planar);
         let range = |of: &dyn Fn(&Flight) -> f64, part: f64| quantile(flights().map(of).collect(), part);
         let end = |axis: usize, part: f64| range(&|flight: &Flight| flight.position[axis], part);
-        let reach = 3.0 * range(&|flight: &Flight| flight.radius, 1.0)?;
-        let mut low = Vector2::new(end(across, STRAGGLERS)? - reach, end(2, STRAGGLERS)? - reach);
-        let mut high = Vector2::new(end(across, 1.0 - STRAGGLERS)? + reach, end(2, 1.0 - STRAGGLERS)? + reach);
-        // Neither a needle nor a ribbon: at most three times as long as wide.
+        let mut low = Vector2::new(end(across, STRAGGLERS)?, end(2, STRAGGLERS)?);
+        let mut high = Vector2::new(end(across, 1.0 - STRAGGLERS)?, end(2, 1.0 - STRAGGLERS)?);
         let middle = (low + high) / 2.0;
-        let half = (high - low) / 2.0;
+        // Room for the outermost grains and a strip of what they hit.
+        let margin = 2.0 * range(&|flight: &Flight| flight.radius, 1.0)?;
+        let half = (high - low) / 2.0 * 1.06 + Vector2::repeat(margin);
+        // Neither a needle nor a ribbon: at most three times as long as wide.
         let half = half.map(|side| side.max(half.max() / 3.0));
         (low, high) = (middle - half, middle + half);
         let aspect = half.x / half.y;
@@ -161,7 +162,7 @@ impl View {
         let (left, top) = (LEFT + column * (width + GAP), HEADING + row * (height + CAPTION) + CAPTION);
         let caption = format!(
             "{}, {} grains",
-            quantity(still.time, "s"),
+            brief(still.time, "s"),
             crate::output::summary::grouped(still.flights.len() as u64)
         );
         write(area, &caption, [left, top - 5], 13, INK, (HPos::Left, VPos::Bottom))?;
@@ -213,9 +214,9 @@ impl View {
             .build_cartesian_2d(low.x..high.x, low.y..high.y)?;
         let mut mesh = chart.configure_mesh();
         mesh.disable_mesh()
-            .axis_style(INK.stroke_width(fine(1)))
-            .label_style(style(13, INK, (HPos::Left, VPos::Top)))
-            .axis_desc_style(style(14, INK, (HPos::Left, VPos::Top)))
+            .axis_style(FRAME.stroke_width(fine(1)))
+            .label_style(style(12, INK, (HPos::Left, VPos::Top)))
+            .axis_desc_style(style(13, INK, (HPos::Left, VPos::Top)))
             .set_all_tick_mark_size(fine(4))
             .x_labels(5)
             .y_labels(5)
@@ -228,8 +229,9 @@ impl View {
             mesh.x_desc(format!("{} ({}m)", ["x", "y"][self.across], unit.symbol));
         }
         mesh.draw()?;
-        let frame = [(left * FINE, top * FINE), ((left + width) * FINE, (top + height) * FINE)];
-        area.draw(&Rectangle::new(frame, INK.stroke_width(fine(1))))
+        let corners = [(0, 0), (1, 0), (1, 1), (0, 1), (0, 0)];
+        let frame = corners.map(|(x, y)| ((left + x * width) * FINE, (top + y * height) * FINE));
+        area.draw(&PathElement::new(frame, FRAME.stroke_width(fine(1))))
     }
 
     /// What of the surface is in view.
