@@ -60,7 +60,7 @@ impl Simulation {
     pub fn new(scene: &Scene, folder: &Path) -> Result<Self, Invalid> {
         let surface = Surface::new(&scene.surface, folder)?;
         let placed =
-            source::place(scene, folder, &|centre, radius| surface.overlaps(centre, radius).map(|hit| hit.depth))?;
+            source::place(scene, folder, &|centre, radius| surface.overlaps(centre, radius).map(|(_, depth)| depth))?;
         let domain = domain(scene);
         let largest = placed.grains.iter().map(|grain| grain.radius).fold(0.0, f64::max);
         if !domain.holds(largest) {

@@ -242,9 +242,9 @@ fn compare<C: Calendar>(case: &Case, until: f64, events: usize) -> usize {
             let flow = engine.advance(time, &mut seen, &mut |_| ControlFlow::Continue(())).unwrap();
             assert!(flow.is_continue());
             while twin.step(time - twin.epoch_start, &mut expected) {}
-            assert_eq!(seen.0.len(), expected.0.len(), "number of events until t = {time}");
-            if let Some(wrong) = (0..seen.0.len()).find(|&k| seen.0[k] != expected.0[k]) {
-                panic!("event {wrong}: engine {:?}, twin {:?}", seen.0[wrong], expected.0[wrong]);
+            let differ = |k: &usize| seen.0.get(*k) != expected.0.get(*k);
+            if let Some(wrong) = (0..seen.0.len().max(expected.0.len())).find(differ) {
+                panic!("event {wrong}: engine {:?}, twin {:?}", seen.0.get(wrong), expected.0.get(wrong));
             }
             if expected.0.len() >= events {
                 break;
@@ -304,7 +304,7 @@ fn planar_periodic_gas() {
 #[test]
 fn open_domain_with_meshes_and_moving_planes() {
     let mut events = 0;
-    for seed in 0..12 {
+    for seed in 0..24 {
         let mut random = Pcg64::seed_from_u64(seed);
         let domain = cube(2.0, false, false);
         let inner = Domain { min: Vector3::new(-1.9, -1.9, -1.0), max: Vector3::new(1.9, 1.9, 1.8), ..domain };
@@ -359,7 +359,7 @@ fn calendar_and_observation_do_not_change_a_bit() {
         let mut engine: EventDriven<Surface, C> = EventDriven::new(grains, surface, domain, laws, 0.0);
         let mut log = Log::default();
         for look in 1..=looks {
-            let time = 20.0 * f64::from(look) / f64::from(looks);
+            let time = 60.0 * f64::from(look) / f64::from(looks);
             while engine.epoch_end() < time {
                 let _ = engine.advance(engine.epoch_end(), &mut log, &mut |_| ControlFlow::Continue(())).unwrap();
                 engine.start_epoch();
@@ -367,7 +367,7 @@ fn calendar_and_observation_do_not_change_a_bit() {
             let _ = engine.advance(time, &mut log, &mut |_| ControlFlow::Continue(())).unwrap();
             engine.snapshot(time, |snapshot| assert_eq!(snapshot.grains.len(), 2000));
         }
-        let flights = engine.snapshot(20.0, |snapshot| snapshot.flights.to_vec());
+        let flights = engine.snapshot(60.0, |snapshot| snapshot.flights.to_vec());
         (log, flights)
     }
     let plain = run::<PlainCalendar>(&grains, domain, laws, 1);
