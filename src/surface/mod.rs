@@ -113,7 +113,8 @@ impl Surface {
     }
 
     /// Whether a grain at rest at `position` (m) is inside a surface at the start of the epoch: it reaches below a plane, cuts a
-    /// triangle, or has its centre inside a watertight mesh. Says into which element it reaches the deepest, and how deep (m).
+    /// triangle, or has its centre inside a watertight mesh, which is taken for solid (a vessel needs an opening, or walls with an
+    /// inside and an outside). Says into which element it reaches the deepest, and how deep (m).
     #[must_use]
     pub fn overlaps(&self, position: Vector3<f64>, radius: f64) -> Option<(u32, f64)> {
         let overlaps = self.parts.iter().filter_map(|part| part.overlap(position - part.offset, radius));
