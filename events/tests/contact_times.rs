@@ -250,9 +250,10 @@ proptest! {
     }
 }
 
-/// When two spheres touch that are `r` apart, move with `v` against each other and whose radii add up to `reach`.
+/// When two spheres touch that are `r` apart, move with `v` against each other and whose radii add up to `reach`; a negative one
+/// never touches.
 fn exact_meeting(r: &Exact, v: &Exact, reach: &Real) -> Option<Real> {
-    earlier_root(&v.dot(v), &r.dot(v), &(r.dot(r) - reach * reach))
+    if *reach < real(0.0) { None } else { earlier_root(&v.dot(v), &r.dot(v), &(r.dot(r) - reach * reach)) }
 }
 
 proptest! {
@@ -263,6 +264,7 @@ proptest! {
         place in vector(1e3), apart in vector(1.0), distance in 0.0..6.0f64, side in vector(1.0), aside in 0.0..1.1f64,
         common in vector(10.0), pace in -6.0..6.0f64, sizes in [-4.0..-0.31, -4.0..-0.31f64],
     ) {
+        prop_assume!(apart.norm() > 0.01 && apart.cross(&side).norm() > 1e-4);
         let radii = sizes.map(|size| 10f64.powf(size));
         let direction = apart.normalize();
         let reach = radii[0] + radii[1];
