@@ -1,4 +1,4 @@
-//! Contact times with planes and triangles against the same geometry in 60 digits.
+//! Contact times with spheres, planes and triangles against the same geometry in 60 digits.
 //!
 //! A contact time cannot be better than its data: an error of one unit in the last place of a position moves it by that distance
 //! over the speed of arrival. So a time passes when the centre, placed there in exact arithmetic, is off its contact by no more
@@ -9,7 +9,7 @@ use std::ops::{Add, Mul, Sub};
 
 use dashu_float::{FBig, round::mode::HalfEven};
 use impinge_events::Flight;
-use impinge_events::contact_time::{sphere_plane, sphere_triangle};
+use impinge_events::contact_time::{sphere_plane, sphere_sphere, sphere_triangle};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
@@ -246,6 +246,51 @@ proptest! {
                 prop_assert!(error <= UNITS * distances, "{error:e}");
             }
             None => prop_assert!(double(&approach) <= UNITS * velocity.norm()),
+        }
+    }
+}
+
+/// When two spheres touch that are `r` apart, move with `v` against each other and whose radii add up to `reach`; a negative one
+/// never touches.
+fn exact_meeting(r: &Exact, v: &Exact, reach: &Real) -> Option<Real> {
+    if *reach < real(0.0) { None } else { earlier_root(&v.dot(v), &r.dot(v), &(r.dot(r) - reach * reach)) }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn spheres_from_anywhere(
+        place in vector(1e3), apart in vector(1.0), distance in 0.0..6.0f64, side in vector(1.0), aside in 0.0..1.1f64,
+        common in vector(10.0), pace in -6.0..6.0f64, sizes in [-4.0..-0.31, -4.0..-0.31f64],
+    ) {
+        prop_assume!(apart.norm() > 0.01 && apart.cross(&side).norm() > 1e-4);
+        let radii = sizes.map(|size| 10f64.powf(size));
+        let direction = apart.normalize();
+        let reach = radii[0] + radii[1];
+        // Aims beside the centre by up to a little more than the sum of the radii, from next to it to a million away.
+        let aim = (side - direction * side.dot(&direction)).normalize() * (aside * reach);
+        let away = direction * (reach * 1.001 + 10f64.powf(distance) - 1.0);
+        let a = Flight { position: place, time: 0.0, velocity: common, radius: radii[0] };
+        let velocity = common + (aim - away).normalize() * 10f64.powf(pace);
+        let b = Flight { position: place + away, time: 0.0, velocity, radius: radii[1] };
+        let r = &Exact::of(b.position) - &Exact::of(a.position);
+        let v = &Exact::of(b.velocity) - &Exact::of(a.velocity);
+        let reach = real(a.radius) + real(b.radius);
+        let found = sphere_sphere(&a, &b, Vector3::zeros());
+        prop_assert_eq!(found, sphere_sphere(&b, &a, Vector3::zeros()));
+        let speed = (b.velocity - a.velocity).norm();
+        // What rounding makes of the coordinates, and of the relative velocity on the way.
+        let on_the_way = (a.velocity.norm() + b.velocity.norm()) / speed;
+        let tolerance = UNITS * (a.position.norm() + b.position.norm() + away.norm() * on_the_way);
+        prop_assume!(double(&(r.dot(&r).sqrt() - &reach)) > tolerance);
+        let [early, late] = [tolerance, -tolerance].map(|by| exact_meeting(&r, &v, &(&reach + real(by))));
+        match found {
+            Some(time) => {
+                prop_assert!(early.is_some_and(|early| early <= real(time * (1.0 + UNITS))), "{time} too early");
+                prop_assert!(late.is_none_or(|late| late >= real(time * (1.0 - UNITS))), "{time} too late");
+            }
+            None => prop_assert!(late.is_none(), "none instead of {}", double(&late.expect("a time"))),
         }
     }
 }

@@ -113,7 +113,8 @@ impl Surface {
     }
 
     /// Whether a grain at rest at `position` (m) is inside a surface at the start of the epoch: it reaches below a plane, cuts a
-    /// triangle, or has its centre inside a watertight mesh. Says into which element it reaches the deepest, and how deep (m).
+    /// triangle, or has its centre inside a watertight mesh, which is taken for solid (a vessel needs an opening, or walls with an
+    /// inside and an outside). Says into which element it reaches the deepest, and how deep (m).
     #[must_use]
     pub fn overlaps(&self, position: Vector3<f64>, radius: f64) -> Option<(u32, f64)> {
         let overlaps = self.parts.iter().filter_map(|part| part.overlap(position - part.offset, radius));
@@ -274,7 +275,8 @@ fn shape(surface: &scene::Surface, folder: &Path, key: &str) -> Result<(Shape, V
             }
             let mut triangles = mesh::read(&folder.join(&file.path), &path_key)?;
             triangles.iter_mut().flatten().for_each(|corner| *corner = *corner * file.scale + offset);
-            (Shape::mesh(&triangles, &path_key)?, file.velocity)
+            let named = |bad: Invalid| Invalid { what: format!("{}: {}", file.path, bad.what), ..bad };
+            (Shape::mesh(&triangles, &path_key).map_err(named)?, file.velocity)
         }
         scene::Surface::Disc(disc) => (Shape::mesh(&generated::disc(disc, key)?, key)?, disc.velocity),
         scene::Surface::Rectangle(rectangle) => {
@@ -293,9 +295,9 @@ fn finite(vector: Vec3, key: &str) -> Result<Vector3<f64>, Invalid> {
 
 fn unit(vector: Vec3, key: &str) -> Result<Vector3<f64>, Invalid> {
     let direction = finite(vector, key)?;
+    if direction == Vector3::zeros() {
+        return Err(Invalid::new(key, format!("{vector:?} has no direction"), "Give any vector but 0."));
+    }
     // In units of its largest component nothing overflows or underflows.
-    let scaled = direction / direction.amax();
-    scaled
-        .try_normalize(0.5)
-        .ok_or_else(|| Invalid::new(key, format!("{vector:?} has no direction"), "Give any vector but 0."))
+    Ok((direction / direction.amax()).normalize())
 }
