@@ -115,7 +115,7 @@ impl Space {
 
 /// Solid fractions that random sequential addition does not reach in a box that is many grains wide, in space and in the
 /// plane. It saturates at 0.3841 and 0.5471 (Zhang & Torquato 2013), in a box with walls a little below, and with a
-/// thousand grains the saturation scatters by less than 0.002. To ask for more is refused at once; without this it would
+/// thousand grains the saturation scatters by less than 0.01. To ask for more is refused at once; without this it would
 /// be refused too, but in a large box only after the minutes that it takes to fill it.
 const OUT_OF_REACH: [f64; 2] = [0.45, 0.62];
 
