@@ -116,18 +116,22 @@ impl Nozzle {
             let (position, direction) = self.opening.draw(&mut self.rng);
             if is_free(position, radius) {
                 self.entered += 1;
-                let next = self.next();
-                self.waiting = Waiting { due: next.due.max(time), ..next };
+                self.waiting = self.next();
+                if self.waiting.due < time {
+                    self.defer(time); // it waited behind this one
+                }
                 let velocity = self.speed * direction;
                 return Some(NewGrain { position, velocity, spin: self.spin, radius, density: self.density });
             }
         }
-        if !self.waiting.deferred {
-            self.waiting.deferred = true;
-            self.deferred += 1;
-        }
-        self.waiting.due = (time + RETRY_FLIGHT * 2.0 * radius / self.speed).max(time.next_up());
+        self.defer((time + RETRY_FLIGHT * 2.0 * radius / self.speed).max(time.next_up()));
         None
+    }
+
+    fn defer(&mut self, due: f64) {
+        self.deferred += u64::from(!self.waiting.deferred);
+        self.waiting.deferred = true;
+        self.waiting.due = due;
     }
 
     /// How many grains have entered.
@@ -136,7 +140,7 @@ impl Nozzle {
         self.entered
     }
 
-    /// How many grains had to wait for a free place after they were due.
+    /// How many grains had to wait after they were due, for a free place or for a grain before them.
     #[must_use]
     pub fn deferred(&self) -> u64 {
         self.deferred
