@@ -120,7 +120,7 @@ pub struct PlaneMap {
 }
 
 impl PlaneMap {
-    /// At most so many cells along each side: a footprint of a tenth of the spray is still told in detail; 10 MB at most.
+    /// At most so many cells along each side: a footprint of a tenth of the spray is told in detail, for some 20 MB at most.
     pub const MAX_CELLS: i64 = 512;
 
     fn new(shape: &PlaneShape, finest: f64) -> Self {
