@@ -120,7 +120,7 @@ pub struct PlaneMap {
 }
 
 impl PlaneMap {
-    /// At most so many cells along each side: a footprint of a tenth of the spray is still told in detail; 10 MB at most.
+    /// At most so many cells along each side: a footprint of a tenth of the spray is told in detail, for some 20 MB at most.
     pub const MAX_CELLS: i64 = 512;
 
     fn new(shape: &PlaneShape, finest: f64) -> Self {
@@ -174,10 +174,8 @@ impl PlaneMap {
         let from_point = position - self.shape.point;
         let cell = self.axes.map(|axis| (axis.dot(&from_point) / self.width).floor() as i64);
         self.cells.entry(cell).or_default().add(tally);
-        for axis in 0..2 {
-            self.low[axis] = self.low[axis].min(cell[axis]);
-            self.high[axis] = self.high[axis].max(cell[axis]);
-        }
+        self.low = std::array::from_fn(|axis| self.low[axis].min(cell[axis]));
+        self.high = std::array::from_fn(|axis| self.high[axis].max(cell[axis]));
         while (0..2).any(|axis| self.high[axis].saturating_sub(self.low[axis]) >= Self::MAX_CELLS) {
             self.coarsen();
         }

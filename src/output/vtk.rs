@@ -148,7 +148,7 @@ pub fn write_grains(out: &mut dyn Write, snapshot: &Snapshot<'_>) -> io::Result<
     let Snapshot { flights, grains, .. } = snapshot;
     let mut vertices = Cells::default();
     (0..flights.len()).for_each(|point| vertices.add([point]));
-    let vectors = |of: Vec<Vector3<f64>>| Values::scalars(of.into_iter().flat_map(|vector| <[f64; 3]>::from(vector)));
+    let vectors = |of: Vec<Vector3<f64>>| Values::scalars(of.into_iter().flat_map(<[f64; 3]>::from));
     let energies = flights.iter().zip(*grains).map(|(flight, grain)| kinetic_energy(flight, grain));
     let of_points = vec![
         Array::new("radius", 1, Values::scalars(flights.iter().map(|flight| flight.radius))),

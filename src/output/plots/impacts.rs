@@ -97,6 +97,7 @@ impl Squares {
             .set_label_area_size(LabelAreaPosition::Bottom, fine(LABELS[1]))
             .build_cartesian_2d(at(0, 0)..at(0, self.columns()), at(1, 0)..at(1, self.rows()))?;
         let most = self.most();
+        chart.plotting_area().fill(&colour_of(0.0))?;
         for (x, column) in self.columns.iter().enumerate() {
             for (y, &energy) in column.iter().enumerate().filter(|(_, energy)| **energy > 0.0) {
                 let corners = [(at(0, x), at(1, y)), (at(0, x + 1), at(1, y + 1))];

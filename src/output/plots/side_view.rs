@@ -12,7 +12,7 @@ use super::{Area, Drawn, FINE, FRAME, HEADING, INK, colour_bar, colour_of, fine,
 use crate::grains::Snapshot;
 use crate::observe::SurfaceShape;
 use crate::output::summary::{Prefix, brief};
-use crate::scene::{Domain, Scene};
+use crate::scene::Scene;
 use crate::scheme::Observer;
 
 /// Moments that are shown, evenly spaced over the run.
@@ -20,7 +20,7 @@ const MOMENTS: u32 = 6;
 /// Cells of the raster per pixel: what is hidden at this resolution is not drawn.
 const CELLS: f64 = 2.0;
 /// Part of the grains that may lie outside the view on each side: a few stragglers shall not make the jet tiny.
-const STRAGGLERS: f64 = 0.01;
+const STRAGGLERS: f64 = 0.005;
 /// Room for all panels together, pixels.
 const ROOM: [f64; 2] = [1040.0, 720.0];
 /// Room for the labels left of the panels, pixels.
@@ -40,17 +40,37 @@ const SURFACE: RGBColor = RGBColor(0xcf, 0xcb, 0xc4);
 /// One moment.
 struct Still {
     time: f64,
-    flights: Vec<Flight>,
+    discs: Vec<Disc>,
+}
+
+/// A grain as far as the picture needs it: 20 bytes, for there may be many.
+struct Disc {
+    place: [f32; 3],
+    radius: f32,
+    speed: f32,
+}
+
+impl Disc {
+    fn new(flight: &Flight) -> Self {
+        let place = [flight.position.x as f32, flight.position.y as f32, flight.position.z as f32];
+        Self { place, radius: flight.radius as f32, speed: flight.velocity.norm() as f32 }
+    }
+
+    fn place(&self) -> Vector3<f64> {
+        Vector3::from(self.place).cast()
+    }
 }
 
 /// Keeps the grains of a few samples to draw them at the end.
 pub struct SideView {
     wanted: bool,
-    domain: Domain,
+    planar: bool,
     start: f64,
     until: f64,
     half_interval: f64,
     stills: Vec<Still>,
+    /// Sum of the velocities in all stills, m/s: where the grains fly.
+    flow: Vector3<f64>,
 }
 
 impl SideView {
@@ -60,11 +80,12 @@ impl SideView {
         let (start, until) = (scene.run.start, scene.run.until);
         Self {
             wanted: scene.output.pictures,
-            domain: scene.domain.clone(),
+            planar: scene.domain.planar,
             start,
             until,
             half_interval: 0.5 * (until - start) / f64::from(scene.output.samples.max(1)),
             stills: Vec::new(),
+            flow: Vector3::zeros(),
         }
     }
 
@@ -84,7 +105,8 @@ impl Observer for SideView {
     fn sample(&mut self, snapshot: &Snapshot<'_>) {
         let due = self.start + (self.until - self.start) * self.stills.len() as f64 / f64::from(MOMENTS - 1);
         if self.wanted && self.stills.len() < MOMENTS as usize && snapshot.time + self.half_interval >= due {
-            self.stills.push(Still { time: snapshot.time, flights: snapshot.flights.to_vec() });
+            self.flow += snapshot.flights.iter().map(|flight| flight.velocity).sum::<Vector3<f64>>();
+            self.stills.push(Still { time: snapshot.time, discs: snapshot.flights.iter().map(Disc::new).collect() });
         }
     }
 }
@@ -93,7 +115,7 @@ impl Observer for SideView {
 struct View {
     /// The axes of the scene that run to the right and, with its sign, towards the viewer; z runs up.
     across: usize,
-    towards: (usize, f64),
+    towards: (usize, f32),
     low: Vector2<f64>,
     high: Vector2<f64>,
     /// Width and height of a panel, pixels.
@@ -106,15 +128,15 @@ struct View {
 
 impl View {
     fn of(side_view: &SideView) -> Option<Self> {
-        let flights = || side_view.stills.iter().flat_map(|still| &still.flights);
-        let (across, towards) = direction(flights(), side_view.domain.planar);
-        let range = |of: &dyn Fn(&Flight) -> f64, part: f64| quantile(flights().map(of).collect(), part);
-        let end = |axis: usize, part: f64| range(&|flight: &Flight| flight.position[axis], part);
+        let discs = || side_view.stills.iter().flat_map(|still| &still.discs);
+        let (across, towards) = direction(&side_view.flow, side_view.planar);
+        let range = |of: &dyn Fn(&Disc) -> f64, part: f64| quantile(discs().map(of).collect(), part);
+        let end = |axis: usize, part: f64| range(&|disc| f64::from(disc.place[axis]), part);
         let mut low = Vector2::new(end(across, STRAGGLERS)?, end(2, STRAGGLERS)?);
         let mut high = Vector2::new(end(across, 1.0 - STRAGGLERS)?, end(2, 1.0 - STRAGGLERS)?);
         let middle = (low + high) / 2.0;
         // Room for the outermost grains and a strip of what they hit.
-        let margin = 2.0 * range(&|flight: &Flight| flight.radius, 1.0)?;
+        let margin = 2.0 * range(&|disc| f64::from(disc.radius), 1.0)?;
         let half = (high - low) / 2.0 * 1.06 + Vector2::repeat(margin);
         // Neither a needle nor a ribbon: at most three times as long as wide.
         let half = half.map(|side| side.max(half.max() / 3.0));
@@ -125,7 +147,7 @@ impl View {
         let width = |(columns, rows): (usize, usize)| (ROOM[0] / columns as f64).min(ROOM[1] / rows as f64 * aspect);
         let (columns, rows) = shapes.max_by(|a, b| width(*a).total_cmp(&width(*b)))?;
         let width = width((columns, rows));
-        let mean_radius = flights().map(|flight| flight.radius).sum::<f64>() / flights().count() as f64;
+        let mean_radius = discs().map(|disc| f64::from(disc.radius)).sum::<f64>() / discs().count() as f64;
         Some(Self {
             across,
             towards,
@@ -134,7 +156,7 @@ impl View {
             panel: [width as i32, (width / aspect) as i32],
             columns,
             rows,
-            fastest: range(&|flight: &Flight| flight.velocity.norm(), 1.0 - STRAGGLERS)?,
+            fastest: range(&|disc| f64::from(disc.speed), 1.0 - STRAGGLERS)?,
             radius_shown: mean_radius * width / (2.0 * half.x),
         })
     }
@@ -160,11 +182,8 @@ impl View {
         let [width, height] = self.panel;
         let (column, row) = ((index % self.columns) as i32, (index / self.columns) as i32);
         let (left, top) = (LEFT + column * (width + GAP), HEADING + row * (height + CAPTION) + CAPTION);
-        let caption = format!(
-            "{}, {} grains",
-            brief(still.time, "s"),
-            crate::output::summary::grouped(still.flights.len() as u64)
-        );
+        let caption =
+            format!("{}, {} grains", brief(still.time, "s"), crate::output::summary::grouped(still.discs.len() as u64));
         write(area, &caption, [left, top - 5], 13, INK, (HPos::Left, VPos::Bottom))?;
         let panel = part(area, [left, top, width, height]);
         for corners in &surface.polygons {
@@ -178,25 +197,25 @@ impl View {
             let ends = [(unit(left), height * FINE - unit(top)), (unit(right), height * FINE - unit(bottom))];
             panel.draw(&Rectangle::new(ends, SURFACE.filled()))?;
         }
-        self.draw_grains(&panel, &still.flights)?;
+        self.draw_grains(&panel, &still.discs)?;
         self.draw_frame(area, [left, top], column == 0, lowest)
     }
 
     /// Draws the grains that can be seen, the farthest first.
-    fn draw_grains(&self, panel: &Area<'_>, flights: &[Flight]) -> Drawn {
-        let mut nearest_first: Vec<&Flight> = flights.iter().collect();
-        let nearness = |flight: &Flight| flight.position[self.towards.0] * self.towards.1;
+    fn draw_grains(&self, panel: &Area<'_>, discs: &[Disc]) -> Drawn {
+        let mut nearest_first: Vec<&Disc> = discs.iter().collect();
+        let nearness = |disc: &Disc| disc.place[self.towards.0] * self.towards.1;
         nearest_first.sort_by(|a, b| nearness(b).total_cmp(&nearness(a)));
         let mut raster = self.raster();
-        let seen = nearest_first.into_iter().filter(|flight| {
-            let inside = self.contains(self.flat(&flight.position));
-            inside && raster.cover_disc(self.cells(self.flat(&flight.position)), self.radius(flight) * CELLS)
+        let seen = nearest_first.into_iter().filter(|disc| {
+            let place = self.flat(&disc.place());
+            self.contains(place) && raster.cover_disc(self.cells(place), self.radius(disc) * CELLS)
         });
-        let seen: Vec<&Flight> = seen.collect();
-        for flight in seen.into_iter().rev() {
-            let colour = colour_of(if self.fastest > 0.0 { flight.velocity.norm() / self.fastest } else { 0.0 });
-            let radius = (self.radius(flight) * f64::from(FINE)).round() as i32;
-            panel.draw(&Circle::new(self.units(self.flat(&flight.position)), radius, colour.filled()))?;
+        let seen: Vec<&Disc> = seen.collect();
+        for disc in seen.into_iter().rev() {
+            let colour = colour_of(if self.fastest > 0.0 { f64::from(disc.speed) / self.fastest } else { 0.0 });
+            let radius = (self.radius(disc) * f64::from(FINE)).round() as i32;
+            panel.draw(&Circle::new(self.units(self.flat(&disc.place())), radius, colour.filled()))?;
         }
         Ok(())
     }
@@ -204,7 +223,7 @@ impl View {
     /// Draws the axes of a panel: numbers on the left of the first column and under the last row only.
     fn draw_frame(&self, area: &Area<'_>, [left, top]: [i32; 2], first: bool, lowest: bool) -> Drawn {
         let [width, height] = self.panel;
-        let unit = Prefix::of((self.high - self.low).min() / 2.0);
+        let unit = Prefix::of((self.high - self.low).max() / 2.0);
         let [low, high] = [self.low, self.high].map(|end| end / unit.factor);
         let [left_room, bottom_room] = [if first { LEFT - 10 } else { 0 }, if lowest { BOTTOM } else { 0 }];
         let around = [left - left_room, top, width + left_room, height + bottom_room];
@@ -299,8 +318,8 @@ impl View {
     }
 
     /// The radius on the screen, pixels.
-    fn radius(&self, flight: &Flight) -> f64 {
-        (flight.radius * f64::from(self.panel[0]) / (self.high.x - self.low.x)).max(SMALLEST)
+    fn radius(&self, disc: &Disc) -> f64 {
+        (f64::from(disc.radius) * f64::from(self.panel[0]) / (self.high.x - self.low.x)).max(SMALLEST)
     }
 }
 
@@ -311,8 +330,7 @@ struct Surface {
 }
 
 /// From where to look: along y, unless the grains fly that way.
-fn direction<'a>(flights: impl Iterator<Item = &'a Flight>, planar: bool) -> (usize, (usize, f64)) {
-    let flow: Vector3<f64> = flights.map(|flight| flight.velocity).sum();
+fn direction(flow: &Vector3<f64>, planar: bool) -> (usize, (usize, f32)) {
     if !planar && flow.y.abs() > flow.x.abs().max(flow.z.abs()) { (1, (0, 1.0)) } else { (0, (1, -1.0)) }
 }
 
