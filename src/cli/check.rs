@@ -21,14 +21,14 @@ pub(super) struct Args {
 /// Validates a scene, sources and surfaces included, and prints what it would do.
 pub(super) fn check(args: &Args) -> Result<Ending, Failure> {
     let file = args.scene.read()?;
-    Simulation::new(&file.scene, file.folder()).map_err(|invalid| file.locate(invalid))?;
+    let simulation = Simulation::new(&file.scene, file.folder()).map_err(|invalid| file.locate(invalid))?;
     let mut text = String::new();
-    describe(&mut text, &file).expect("a string takes any text");
+    describe(&mut text, &file, simulation.surface()).expect("a string takes any text");
     print(&text)?;
     Ok(Ending::Done)
 }
 
-fn describe(out: &mut String, file: &SceneFile) -> fmt::Result {
+fn describe(out: &mut String, file: &SceneFile, loaded: &impinge::surface::Surface) -> fmt::Result {
     let scene = &file.scene;
     let (run, domain) = (&scene.run, &scene.domain);
     writeln!(out, "{}: valid", file.path().display())?;
@@ -46,9 +46,13 @@ fn describe(out: &mut String, file: &SceneFile) -> fmt::Result {
         }
     }
     sources(out, scene, file.folder())?;
-    // Here the import report of each mesh belongs.
     for (i, surface) in scene.surface.iter().enumerate() {
         writeln!(out, "surface[{i}]  {}", surface_in_words(surface))?;
+        for (_, report) in loaded.reports().filter(|(number, _)| *number == i) {
+            for line in report.to_string().lines() {
+                writeln!(out, "            {line}")?;
+            }
+        }
     }
     Ok(())
 }

@@ -4,12 +4,16 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
+use cpu_time::ProcessTime;
+use impinge::output::{self, Folder, Recorder};
 use impinge::simulation::Simulation;
-use miette::miette;
+use impinge::source::Nozzle;
+use miette::{Report, miette};
 
 use super::progress::ProgressLine;
-use super::{Ending, Failure, SceneArgs};
+use super::{Ending, Failure, SceneArgs, print};
 
 #[derive(clap::Args)]
 pub(super) struct Args {
@@ -35,24 +39,43 @@ impl Args {
 /// Runs a scene.
 pub(super) fn run(args: &Args) -> Result<Ending, Failure> {
     let file = args.scene.read()?;
+    let (clock, processor) = (Instant::now(), ProcessTime::now());
     let mut simulation = Simulation::new(&file.scene, file.folder()).map_err(|invalid| file.locate(invalid))?;
+    let folder = Folder::begin(&args.folder(), args.force).map_err(|error| Failure::Input(report(&error)))?;
+    let mut recorder = Recorder::new(&file.scene, simulation.surface().into(), folder)
+        .map_err(|error| Failure::Run(report(&error)))?;
 
-    // Here the output folder (args.folder(), args.force) is opened and the observers are made.
-    let _ = (args.folder(), args.force);
-    let mut observer = ();
-
-    let interrupted = catch_interrupt()?;
+    let (interrupted, failed) = (catch_interrupt()?, recorder.failure_flag());
     let mut line = ProgressLine::new(&file.scene.run, args.quiet);
-    let outcome = simulation
-        .run(&mut observer, &mut |progress| {
-            line.show(&progress);
-            if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        })
-        .map_err(|broken| Failure::Run(miette!("{broken}")))?;
+    let run = simulation.run(&mut recorder, &mut |progress| {
+        line.show(&progress);
+        let stop = interrupted.load(Ordering::Relaxed) || failed.load(Ordering::Relaxed);
+        if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
     line.clear();
 
-    // Here the results are closed and the summary is printed (super::print).
+    let outcome = match run {
+        Ok(outcome) => outcome,
+        Err(broken) => {
+            let kept = recorder.abandon().map_err(|error| Failure::Run(report(&error)))?;
+            let help = format!("what was measured until then is in {}; please report the scene", kept.display());
+            return Err(Failure::Run(miette!(help = help, "{broken}")));
+        }
+    };
+    let outcome = output::Outcome {
+        interrupted: outcome.interrupted,
+        entries_deferred: simulation.nozzles().iter().map(Nozzle::deferred).sum(),
+        cpu_seconds: processor.elapsed().as_secs_f64(),
+        wall_seconds: clock.elapsed().as_secs_f64(),
+    };
+    let (summary, written) = recorder.finish(&outcome).map_err(|error| Failure::Run(report(&error)))?;
+    print(&format!("{summary}\nwritten to {}\n", written.display()))?;
     Ok(if outcome.interrupted { Ending::Interrupted } else { Ending::Done })
+}
+
+/// An output error with its remedy.
+fn report(error: &output::Error) -> Report {
+    miette!(help = error.remedy(), "{error}")
 }
 
 /// A flag that Ctrl-C raises; the run stops at its next look. A second Ctrl-C does not wait for that.

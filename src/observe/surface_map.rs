@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 use rustc_hash::FxHashMap;
 
 use crate::scheme::{Observer, SurfaceHit};
+use crate::surface::Surface;
 
 /// A plane of the surface, as pictures need it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,6 +40,14 @@ impl SurfaceShape {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.planes.is_empty() && self.triangles.is_empty()
+    }
+}
+
+impl From<&Surface> for SurfaceShape {
+    fn from(surface: &Surface) -> Self {
+        let planes = surface.planes().map(|(element, point, normal)| PlaneShape { element, point, normal });
+        let triangles = surface.triangles().map(|(element, corners)| TriangleShape { element, corners });
+        Self { planes: planes.collect(), triangles: triangles.collect() }
     }
 }
 
