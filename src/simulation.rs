@@ -59,17 +59,15 @@ impl Simulation {
     /// A value of the scene that cannot be used, by its key.
     pub fn new(scene: &Scene, folder: &Path) -> Result<Self, Invalid> {
         let surface = Surface::new(&scene.surface, folder)?;
-        let placed =
-            source::place(scene, folder, &|centre, radius| surface.overlaps(centre, radius).map(|(_, depth)| depth))?;
-        let domain = domain(scene);
-        let largest = placed.grains.iter().map(|grain| grain.radius).fold(0.0, f64::max);
-        if !domain.holds(largest) {
-            let what = format!(
-                "a periodic domain must be at least eight grain radii wide, and the largest grain has {largest} m"
-            );
-            return Err(Invalid::new("domain.max", what, "widen the domain or make the grains smaller"));
+        if scene.domain.planar {
+            surface.check_planar()?;
         }
-        let scheme = EventDriven::new(&placed.grains, surface, domain, laws(scene)?, scene.run.start);
+        let overlap = |centre, radius| {
+            let (element, depth) = surface.overlaps(centre, radius)?;
+            Some((surface.number_of(element), depth))
+        };
+        let placed = source::place(scene, folder, &overlap)?;
+        let scheme = EventDriven::new(&placed.grains, surface, domain(scene), laws(scene)?, scene.run.start);
         let moments = |count| Moments::new(scene.run.start, scene.run.until, count);
         Ok(Self {
             scheme,

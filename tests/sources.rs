@@ -355,14 +355,15 @@ fn bad_tables_are_refused_with_line_column_and_value() {
         (ROOM, "x,y,z,vx,vz\n1,2,3,4,5\n", "lacks the columns vy"),
         (ROOM, "x,y,z,vx,vy,vz,raduis\n1,2,3,4,5,6,7\n", "`raduis` that means nothing; the nearest name is `radius`"),
         (ROOM, "x,y,z,vx,vy,vz,x\n1,2,3,4,5,6,7\n", "has the column `x` twice"),
-        (ROOM, "x,y,z,vx,vy,vz\n0,0,0,0,0,0\n1,2,3,4,5,six\n", "line 3, column `vz`: `six` is not a number"),
-        (ROOM, "x,y,z,vx,vy,vz\n0,0,NaN,0,0,0\n", "line 2, column `z`: `NaN` is not finite"),
-        (ROOM, "x,y,z,vx,vy,vz\n0,0,1e999,0,0,0\n", "line 2, column `z`: `1e999` is not finite"),
-        (ROOM, "x,y,z,vx,vy,vz,radius\n0,0,0,0,0,0,-0.1\n", "line 2, column `radius`: `-0.1` is not larger than 0"),
-        (ROOM, "x,y,z,vx,vy,vz,density\n0,0,0,0,0,0,0\n", "line 2, column `density`: `0` is not larger than 0"),
+        (ROOM, "x,y,z,vx,vy,vz\n0,0,0,0,0,0\n1,2,3,4,5,six\n", "line 3: column `vz`: `six` is not a number"),
+        (ROOM, "x,y,z,vx,vy,vz\n0,0,NaN,0,0,0\n", "line 2: column `z`: `NaN` is not finite"),
+        (ROOM, "x,y,z,vx,vy,vz\n0,0,1e999,0,0,0\n", "line 2: column `z`: `1e999` is not finite"),
+        (ROOM, "x,y,z,vx,vy,vz,radius\n0,0,0,0,0,0,-0.1\n", "line 2: column `radius`: `-0.1` is not larger than 0"),
+        (ROOM, "x,y,z,vx,vy,vz,density\n0,0,0,0,0,0,0\n", "line 2: column `density`: `0` is not larger than 0"),
+        (ROOM, "# mm\nx,y,z,vx,vy,vz\n\n0,0,0,0,0,0\n\r\n# last\n1,2,3,4,5,six", "line 7: column `vz`: `six` is not a"),
         (ROOM, "x,y,z,vx,vy,vz\n0,0,0,0,0\n", "line 2: 5 values, but the header has 6 columns"),
-        (planar, "x,y,z,vx,vy,vz\n0,0.1,0,0,0,0\n", "line 2, column `y`: `0.1` is not 0, but the scene is planar"),
-        (planar, "x,y,z,vx,vy,vz\n0,0,0,0,-1,0\n", "line 2, column `vy`: `-1` is not 0, but the scene is planar"),
+        (planar, "x,y,z,vx,vy,vz\n0,0.1,0,0,0,0\n", "line 2: column `y`: `0.1` is not 0, but the scene is planar"),
+        (planar, "x,y,z,vx,vy,vz\n0,0,0,0,-1,0\n", "line 2: column `vy`: `-1` is not 0, but the scene is planar"),
     ] {
         let refused = from_table(domain, text).unwrap_err();
         assert_eq!(refused.key, "source[0].path");
@@ -422,7 +423,7 @@ fn grains_outside_the_domain_or_in_the_surface_are_refused() {
     let refused =
         from_table("min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0]", &table(&[[0.5; 3], [0.5, 0.5, 1.5]])).unwrap_err();
     assert!(refused.what.contains("grain 1 at (0.5, 0.5, 1.5), radius 0.01, has its centre outside the domain"));
-    let plane = |position: Vector3<f64>, radius: f64| (position.z < radius).then_some(radius - position.z);
+    let plane = |position: Vector3<f64>, radius: f64| (position.z < radius).then_some((3, radius - position.z));
     let at = |z: f64| place(&scene(ROOM, &block(1, [0.0, 0.0, z], [0.0, 0.0, z], "")), Path::new("."), &plane);
     assert!(at(0.01 - 1e-16).is_ok(), "a grain that rests on the surface touches it");
     let refused = at(0.008).unwrap_err();

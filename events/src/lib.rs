@@ -45,4 +45,5 @@ pub use domain::Domain;
 pub use encounters::{Encounter, Encounters};
 pub use flight::Flight;
 pub use mesh::{BadTriangle, Mesh};
+pub use neighbors::least_period;
 pub use surface::{NoSurface, Outlook, Surface, SurfaceContact};

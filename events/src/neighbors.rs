@@ -24,8 +24,10 @@ const SLOTS_PER_GRAIN: usize = 4;
 const STRIDES: Vector3<u32> = Vector3::new(1, 0x9E37_79B1, 0xC949_57E9);
 const NOBODY: u32 = u32::MAX;
 
-/// Smallest length of a period for grains of this radius, m.
-pub(crate) fn least_period(radius: f64) -> f64 {
+/// Smallest side (m) that a periodic domain may have for grains of this radius (m): eight radii and a little, or the image that a
+/// grain meets would not be clear.
+#[must_use]
+pub fn least_period(radius: f64) -> f64 {
     f64::from(FEWEST_PERIODIC_CELLS) * contact_width(radius)
 }
 

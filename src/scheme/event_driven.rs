@@ -10,11 +10,16 @@ use super::{Broken, GrainCollision, Observer, Passage, Progress, SurfaceHit};
 use crate::grains::{Grain, NewGrain, Snapshot};
 use crate::law::{Body, ContactLaw, resolve_pair, resolve_surface};
 use crate::scene::Interference;
+use crate::surface::LARGEST_SLOPE;
 
 /// Length of an epoch in the time that the fastest grain needs for its own radius (of the smallest grain).
 ///
 /// Within an epoch a time is known to 2^-53 of the epoch, so a position to 4096 × 2^-53 = 5e-13 radii.
 const EPOCH_RADII: f64 = 4096.0;
+/// Length of an epoch in which nothing moves, s; twice the time reached where that is longer.
+const IDLE_EPOCH: f64 = (1u64 << 20) as f64;
+/// Shortest epoch over the time reached: below 2^-52 simulated time would stand still.
+const LEAST_EPOCH: f64 = 1.0 / (1u64 << 50) as f64;
 /// Overlap at an event, over the smaller radius, above which a run is wrong and stops. Rounding leaves about 1e-13.
 pub const LARGEST_OVERLAP: f64 = 1e-9;
 /// A run is jammed when so many encounters a grain, and [`JAM_ENCOUNTERS`] more, happen while time goes on by less than
@@ -46,7 +51,7 @@ pub struct EventDriven<S: Surface, C: Calendar = Tournament> {
     domain: Domain,
     /// Simulated time at the start of the epoch, s.
     epoch_start: f64,
-    /// Length of the epoch, s: a power of two, so that `epoch_start` stays exact.
+    /// Length of the epoch, s: a power of two, so that `epoch_start` stays exact, unless an entry cuts it short.
     epoch: f64,
     /// Simulated time that has been reached, s.
     time: f64,
@@ -104,7 +109,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.epoch_start + self.epoch
     }
 
-    /// Starts the next epoch at the end of the current one, and chooses its length by the fastest grain.
+    /// Starts the next epoch at the end of the current one, and chooses its length by the fastest and the smallest grain.
     pub fn start_epoch(&mut self) {
         let mut fastest = 0f64;
         let mut smallest = f64::INFINITY;
@@ -113,12 +118,10 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             fastest = fastest.max(flight.velocity.norm());
             smallest = smallest.min(flight.radius);
         }
-        let wanted = EPOCH_RADII * smallest / fastest;
-        // Without grains, or with grains at rest, there is nothing to resolve.
-        let next = if wanted.is_finite() { 2f64.powi(wanted.log2().floor() as i32) } else { 2f64.powi(20) };
+        let start = self.epoch_start + self.epoch;
+        let next = epoch_length(smallest, fastest, start);
         self.encounters.start_epoch(self.epoch, next);
-        self.epoch_start += self.epoch;
-        self.epoch = next;
+        (self.epoch_start, self.epoch) = (start, next);
         (self.mark, self.since_mark) = (0.0, 0);
     }
 
@@ -223,13 +226,19 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     fn hit(&mut self, time: f64, grain: u32, element: u32, observer: &mut impl Observer) -> Result<(), Broken> {
         let before = self.body(grain);
         let flight = *self.encounters.flight(grain);
-        let contact = self.encounters.surface().contact(element, &flight);
+        let mut contact = self.encounters.surface().contact(element, &flight);
+        let id = self.grains[grain as usize].id;
+        if self.domain.planar && contact.normal.y != 0.0 {
+            if contact.normal.y.abs() > LARGEST_SLOPE {
+                return Err(Broken::OutOfPlane { time: self.epoch_start + time, grain: id });
+            }
+            contact.normal = Vector3::new(contact.normal.x, 0.0, contact.normal.z).normalize();
+        }
         let resolved = resolve_surface(&self.laws.surface, &before, contact.normal, contact.velocity);
         if resolved.impulse.normal == 0.0 {
             self.encounters.deflect(&[(grain, before.velocity)]);
             return Ok(());
         }
-        let id = self.grains[grain as usize].id;
         let overlap_over_radius = -contact.gap / before.radius;
         self.check(time, &[id], overlap_over_radius, &[resolved.after.velocity])?;
         let carried = &mut self.grains[grain as usize];
@@ -282,6 +291,11 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             self.grains[slot] = grain;
         }
         observer.passage(Passage::Entered, time, &flight, &grain);
+        // A grain faster or smaller than those inside needs a finer time from now on.
+        if epoch_length(flight.radius, flight.velocity.norm(), self.epoch_start) < self.epoch {
+            self.epoch = flight.time;
+            self.start_epoch();
+        }
     }
 
     /// Whether a grain of this radius fits in at `position` at simulated time `time` (s).
@@ -320,6 +334,16 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         }
         Err(broken(self.epoch_start + time, ids, overlap, numbers))
     }
+}
+
+/// Length of an epoch that starts at simulated time `start` (s), for grains of this radius (m) and speed (m/s): a power of two.
+fn epoch_length(radius: f64, speed: f64, start: f64) -> f64 {
+    let power_of_two = |time: f64| 2f64.powi(time.log2().floor() as i32);
+    let wanted = EPOCH_RADII * radius / speed;
+    // Without grains, or with grains at rest, there is nothing to resolve; doubled each time, so that any end is reached.
+    let length = if wanted.is_finite() { power_of_two(wanted) } else { IDLE_EPOCH.max(power_of_two(2.0 * start.abs())) };
+    // At least what moves simulated time on by more than its rounding.
+    length.max(power_of_two(start.abs() * LEAST_EPOCH))
 }
 
 #[cold]
