@@ -46,6 +46,7 @@ pub struct Outcome {
 #[derive(Clone, Debug)]
 pub struct Simulation {
     scheme: EventDriven<Surface>,
+    counts: Vec<usize>,
     nozzles: Vec<Nozzle>,
     samples: Moments,
     frames: Moments,
@@ -71,6 +72,7 @@ impl Simulation {
         let moments = |count| Moments::new(scene.run.start, scene.run.until, count);
         Ok(Self {
             scheme,
+            counts: placed.counts,
             nozzles: placed.nozzles,
             samples: moments(scene.output.samples.max(2)),
             frames: moments(scene.run.frames),
@@ -113,6 +115,12 @@ impl Simulation {
                 Stop::End => return Ok(Outcome { time, interrupted: false }),
             }
         }
+    }
+
+    /// How many grains each source has placed at the start; 0 for a nozzle.
+    #[must_use]
+    pub fn counts(&self) -> &[usize] {
+        &self.counts
     }
 
     /// The nozzles, with what they have sent and deferred so far.

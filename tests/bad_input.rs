@@ -181,7 +181,8 @@ fn a_write_that_fails_stops_the_run_and_spares_earlier_results() {
         .output()
         .expect("it runs");
     let kept = home.path().join("results.stopped");
-    let fragments = ["results/events.csv: ", "what was written before is in ", &kept.to_string_lossy(), "free some space"];
+    let fragments =
+        ["results/events.csv: ", "what was written before is in ", &kept.to_string_lossy(), "free some space"];
     assert_eq!(complaint(&output, 1, &fragments), None);
     let rows = fs::read_to_string(kept.join("events.csv")).expect("it was kept");
     assert!(rows.lines().count() > 100);

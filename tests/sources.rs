@@ -419,7 +419,8 @@ fn overlaps_with_periodic_images_are_found() {
 #[test]
 fn a_periodic_domain_is_eight_radii_wide() {
     let domain = |side: f64| format!("min = [0.0, 0.0, 0.0], max = [1.0, 1.0, {side}], boundary = \"periodic\"");
-    let radius = |radius: f64| format!("x,y,z,vx,vy,vz,radius\n0.2,0.2,0.01,0,0,0,0.001\n0.5,0.5,0.05,0,0,0,{radius}\n");
+    let radius =
+        |radius: f64| format!("x,y,z,vx,vy,vz,radius\n0.2,0.2,0.01,0,0,0,0.001\n0.5,0.5,0.05,0,0,0,{radius}\n");
     assert!(from_table(&domain(0.0801), &radius(0.01)).is_ok());
     let nozzle = |radius: &str| {
         format!(

@@ -108,7 +108,8 @@ fn domain(scene: &Scene) -> Checked {
         }
     }
     if domain.boundary == Boundary::Periodic && !scene.surface.is_empty() {
-        let what = "grains that leave a periodic domain come in again on the other side, but surfaces are not repeated there";
+        let what =
+            "grains that leave a periodic domain come in again on the other side, but surfaces are not repeated there";
         let remedy = "take the surfaces out, or set `domain.boundary = \"open\"`";
         return Err(Invalid::new("surface[0]", what, remedy));
     }

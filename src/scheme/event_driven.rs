@@ -341,7 +341,8 @@ fn epoch_length(radius: f64, speed: f64, start: f64) -> f64 {
     let power_of_two = |time: f64| 2f64.powi(time.log2().floor() as i32);
     let wanted = EPOCH_RADII * radius / speed;
     // Without grains, or with grains at rest, there is nothing to resolve; doubled each time, so that any end is reached.
-    let length = if wanted.is_finite() { power_of_two(wanted) } else { IDLE_EPOCH.max(power_of_two(2.0 * start.abs())) };
+    let length =
+        if wanted.is_finite() { power_of_two(wanted) } else { IDLE_EPOCH.max(power_of_two(2.0 * start.abs())) };
     // At least what moves simulated time on by more than its rounding.
     length.max(power_of_two(start.abs() * LEAST_EPOCH))
 }

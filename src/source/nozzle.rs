@@ -70,7 +70,8 @@ impl Nozzle {
         let speed = value::positive(&context.key("speed"), source.speed)?;
         let radii = context.radii(source.radius.as_ref())?;
         if scene.domain.boundary == Boundary::Periodic && radii.bounds().1.is_infinite() {
-            let what = "a lognormal radius has no upper bound, and sooner or later a grain would be too large for the domain";
+            let what =
+                "a lognormal radius has no upper bound, and sooner or later a grain would be too large for the domain";
             let remedy = "in a periodic domain give the nozzle a constant, uniform or normal radius";
             return Err(Invalid::new(context.key("radius"), what, remedy));
         }

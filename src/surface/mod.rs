@@ -136,7 +136,8 @@ impl Surface {
         for (number, part) in self.parts.iter().enumerate() {
             let Some(mesh) = part.mesh().map(Index::mesh) else { continue };
             let refuse = |what: String| {
-                let remedy = "give a planar scene a surface that does not change along y, or set `domain.planar = false`";
+                let remedy =
+                    "give a planar scene a surface that does not change along y, or set `domain.planar = false`";
                 Err(Invalid::new(format!("surface[{number}]"), what, remedy))
             };
             let meets = |corners: &Triangle| {
