@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::calendar::{Calendar, Event, Kind, Tournament};
-use crate::contact_time::sphere_sphere;
+use crate::contact_time::sphere_sphere_until;
 use crate::neighbors::Cells;
 use crate::{Domain, Flight, NoSurface, Outlook, Surface};
 
@@ -199,6 +199,8 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
                 }
                 Kind::Grains => {
                     let (a, b) = (owner.min(event.partner), owner.max(event.partner));
+                    self.plans[a as usize].pair = never(Kind::Review);
+                    self.plans[b as usize].pair = never(Kind::Review);
                     self.advance(a, event.time);
                     self.advance(b, event.time);
                     return Some((event.time, Encounter::Grains { a, b }));
@@ -510,8 +512,9 @@ impl Search<'_> {
     #[inline]
     fn consider(&mut self, other: u32, shift: Vector3<f64>) {
         self.looks += 1;
-        let Some(time) = sphere_sphere(&self.flight, &self.flights[other as usize], shift) else { return };
-        if time > self.best.time || time > self.limit {
+        let until = self.best.time.min(self.limit);
+        let Some(time) = sphere_sphere_until(&self.flight, &self.flights[other as usize], shift, until) else { return };
+        if time > until {
             return;
         }
         let event = Event { time, kind: Kind::Grains, partner: other };
