@@ -1,0 +1,129 @@
+//! What the physics tests share: a plane, a law without friction, a run without scene or files, and a log of what happened.
+
+// Each test file is a crate of its own and uses its share of this one.
+#![allow(dead_code)]
+
+use std::f64::consts::PI;
+use std::ops::ControlFlow;
+
+use impinge::grains::NewGrain;
+use impinge::law::{ContactLaw, Friction};
+use impinge::scene::Interference;
+use impinge::scheme::{Broken, EventDriven, GrainCollision, Laws, Observer, SurfaceHit};
+use impinge_events::calendar::Calendar;
+use impinge_events::contact_time::sphere_plane;
+use impinge_events::{Flight, Outlook, Surface, SurfaceContact};
+use nalgebra::Vector3;
+
+/// One plane, hit from the side its normal points to.
+#[derive(Clone, Copy, Debug)]
+pub struct Plane {
+    /// A point of it at the start of the epoch, m.
+    pub point: Vector3<f64>,
+    /// Unit normal.
+    pub normal: Vector3<f64>,
+    /// m/s, along the normal or across it.
+    pub velocity: Vector3<f64>,
+}
+
+/// The plane z = 0, hit from above.
+pub const FLOOR: Plane = Plane {
+    point: Vector3::new(0.0, 0.0, 0.0),
+    normal: Vector3::new(0.0, 0.0, 1.0),
+    velocity: Vector3::new(0.0, 0.0, 0.0),
+};
+
+impl Plane {
+    /// The flight as somebody on the plane sees it.
+    fn seen(&self, flight: &Flight) -> Flight {
+        let position = flight.position - self.velocity * flight.time;
+        Flight { position, velocity: flight.velocity - self.velocity, ..*flight }
+    }
+}
+
+impl Surface for Plane {
+    fn first_contact(&self, flight: &Flight, _until: f64) -> Outlook {
+        sphere_plane(&self.seen(flight), self.point, self.normal)
+            .map_or(Outlook::ClearUntil(f64::INFINITY), |time| Outlook::Hit { time, element: 0 })
+    }
+
+    fn contact(&self, _element: u32, flight: &Flight) -> SurfaceContact {
+        let gap = (self.seen(flight).position - self.point).dot(&self.normal) - flight.radius;
+        SurfaceContact { normal: self.normal, gap, velocity: self.velocity }
+    }
+
+    fn start_epoch(&mut self, duration: f64) {
+        self.point += self.velocity * duration;
+    }
+}
+
+/// Laws without friction: restitution between grains and with the surface.
+pub fn smooth(grain: f64, surface: f64) -> Laws {
+    let law = |restitution| ContactLaw { restitution, friction: Friction::Smooth };
+    Laws { grain: law(grain), surface: law(surface), interference: Interference::All }
+}
+
+/// A grain without spin, of mass `mass` (kg).
+pub fn grain(position: Vector3<f64>, velocity: Vector3<f64>, radius: f64, mass: f64) -> NewGrain {
+    NewGrain { position, velocity, spin: Vector3::zeros(), radius, density: mass / (4.0 / 3.0 * PI * radius.powi(3)) }
+}
+
+/// Runs to `until` (s) through as many epochs as it takes.
+pub fn run<S: Surface, C: Calendar>(
+    scheme: &mut EventDriven<S, C>,
+    until: f64,
+    observer: &mut impl Observer,
+) -> Result<(), Broken> {
+    loop {
+        let end = scheme.epoch_end().min(until);
+        let flow = scheme.advance(end, observer, &mut |_| ControlFlow::Continue(()))?;
+        assert!(flow.is_continue());
+        if end == until {
+            return Ok(());
+        }
+        scheme.start_epoch();
+    }
+}
+
+/// Positions, velocities and masses of all grains at time `time` (s) of the current epoch.
+pub fn states<S: Surface, C: Calendar>(scheme: &EventDriven<S, C>, time: f64) -> Vec<(Flight, f64)> {
+    scheme.snapshot(time, |snapshot| {
+        snapshot.flights.iter().zip(snapshot.grains).map(|(flight, grain)| (*flight, grain.mass)).collect()
+    })
+}
+
+/// Kinetic energy of grains that do not spin, J.
+pub fn kinetic_energy(states: &[(Flight, f64)]) -> f64 {
+    states.iter().map(|(flight, mass)| 0.5 * mass * flight.velocity.norm_squared()).sum()
+}
+
+/// What happened, in its order.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Hit {
+    Grains(GrainCollision),
+    Surface(SurfaceHit),
+}
+
+/// Keeps everything that happened.
+#[derive(Clone, Debug, Default)]
+pub struct Log(pub Vec<Hit>);
+
+impl Log {
+    pub fn grain_hits(&self) -> usize {
+        self.0.iter().filter(|hit| matches!(hit, Hit::Grains(_))).count()
+    }
+
+    pub fn surface_hits(&self) -> usize {
+        self.0.len() - self.grain_hits()
+    }
+}
+
+impl Observer for Log {
+    fn grain_collision(&mut self, collision: &GrainCollision) {
+        self.0.push(Hit::Grains(*collision));
+    }
+
+    fn surface_hit(&mut self, hit: &SurfaceHit) {
+        self.0.push(Hit::Surface(*hit));
+    }
+}
