@@ -12,8 +12,10 @@ use impinge::scene::Interference;
 use impinge::scheme::{Broken, EventDriven, GrainCollision, Laws, Observer, SurfaceHit};
 use impinge_events::calendar::Calendar;
 use impinge_events::contact_time::sphere_plane;
-use impinge_events::{Flight, Outlook, Surface, SurfaceContact};
+use impinge_events::{Domain, Flight, Outlook, Surface, SurfaceContact};
 use nalgebra::Vector3;
+use rand::SeedableRng as _;
+use rand_distr::Distribution as _;
 
 /// One plane, hit from the side its normal points to.
 #[derive(Clone, Copy, Debug)]
@@ -52,6 +54,10 @@ impl Surface for Plane {
         SurfaceContact { normal: self.normal, gap, velocity: self.velocity }
     }
 
+    fn speed(&self) -> f64 {
+        self.velocity.amax()
+    }
+
     fn start_epoch(&mut self, duration: f64) {
         self.point += self.velocity * duration;
     }
@@ -68,24 +74,18 @@ pub fn grain(position: Vector3<f64>, velocity: Vector3<f64>, radius: f64, mass: 
     NewGrain { position, velocity, spin: Vector3::zeros(), radius, density: mass / (4.0 / 3.0 * PI * radius.powi(3)) }
 }
 
-/// Runs to `until` (s) through as many epochs as it takes.
+/// Runs to `until` (s).
 pub fn run<S: Surface, C: Calendar>(
     scheme: &mut EventDriven<S, C>,
     until: f64,
     observer: &mut impl Observer,
 ) -> Result<(), Broken> {
-    loop {
-        let end = scheme.epoch_end().min(until);
-        let flow = scheme.advance(end, observer, &mut |_| ControlFlow::Continue(()))?;
-        assert!(flow.is_continue());
-        if end == until {
-            return Ok(());
-        }
-        scheme.start_epoch();
-    }
+    let flow = scheme.advance(until, observer, &mut |_| ControlFlow::Continue(()))?;
+    assert!(flow.is_continue());
+    Ok(())
 }
 
-/// Positions, velocities and masses of all grains at time `time` (s) of the current epoch.
+/// Positions, velocities and masses of all grains at time `time` (s), to which the run has been advanced.
 pub fn states<S: Surface, C: Calendar>(scheme: &EventDriven<S, C>, time: f64) -> Vec<(Flight, f64)> {
     scheme.snapshot(time, |snapshot| {
         snapshot.flights.iter().zip(snapshot.grains).map(|(flight, grain)| (*flight, grain.mass)).collect()
@@ -126,4 +126,24 @@ impl Observer for Log {
     fn surface_hit(&mut self, hit: &SurfaceHit) {
         self.0.push(Hit::Surface(*hit));
     }
+}
+
+/// A face-centred lattice of 4 cells³ elastic-gas grains of radius 0.5 m and mass 1 kg in a periodic cube of packing fraction `phi`, with
+/// Maxwell velocities of variance 1 (m/s)² per component in the frame where the total momentum is zero.
+pub fn gas(cells: u32, phi: f64, seed: u64) -> (Vec<NewGrain>, Domain) {
+    let mut random = rand_pcg::Pcg64::seed_from_u64(seed);
+    let side = (PI / 6.0 * 4.0 / phi).cbrt();
+    let places = [[0.25, 0.25, 0.25], [0.75, 0.75, 0.25], [0.75, 0.25, 0.75], [0.25, 0.75, 0.75]].map(Vector3::from);
+    let mut grains = Vec::new();
+    for cell in 0..cells.pow(3) {
+        let corner = Vector3::new(cell % cells, cell / cells % cells, cell / cells.pow(2)).map(f64::from);
+        for place in places {
+            let velocity = Vector3::from_fn(|_, _| rand_distr::StandardNormal.sample(&mut random));
+            grains.push(grain((corner + place) * side, velocity, 0.5, 1.0));
+        }
+    }
+    let mean = grains.iter().map(|grain| grain.velocity).sum::<Vector3<f64>>() / grains.len() as f64;
+    grains.iter_mut().for_each(|grain| grain.velocity -= mean);
+    let max = Vector3::repeat(f64::from(cells) * side);
+    (grains, Domain { min: Vector3::zeros(), max, periodic: true, planar: false })
 }
