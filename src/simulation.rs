@@ -59,11 +59,14 @@ impl Simulation {
     /// A value of the scene that cannot be used, by its key.
     pub fn new(scene: &Scene, folder: &Path) -> Result<Self, Invalid> {
         let surface = Surface::new(&scene.surface, folder)?;
-        let placed = source::place(scene, folder, &|centre, radius| surface.overlaps(centre, radius).map(|hit| hit.depth))?;
+        let placed =
+            source::place(scene, folder, &|centre, radius| surface.overlaps(centre, radius).map(|(_, depth)| depth))?;
         let domain = domain(scene);
         let largest = placed.grains.iter().map(|grain| grain.radius).fold(0.0, f64::max);
         if !domain.holds(largest) {
-            let what = format!("a periodic domain must be at least eight grain radii wide, and the largest grain has {largest} m");
+            let what = format!(
+                "a periodic domain must be at least eight grain radii wide, and the largest grain has {largest} m"
+            );
             return Err(Invalid::new("domain.max", what, "widen the domain or make the grains smaller"));
         }
         let scheme = EventDriven::new(&placed.grains, surface, domain, laws(scene)?, scene.run.start);
@@ -102,7 +105,8 @@ impl Simulation {
                 }
                 Stop::Entry(nozzle) => {
                     let Self { scheme, nozzles, .. } = self;
-                    let entering = nozzles[nozzle].enter(time, &mut |place, radius| scheme.is_free(place, radius, time));
+                    let entering =
+                        nozzles[nozzle].enter(time, &mut |place, radius| scheme.is_free(place, radius, time));
                     if let Some(grain) = entering {
                         scheme.enter(time, &grain, observer);
                     }

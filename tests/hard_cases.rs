@@ -46,7 +46,8 @@ fn galperin(k: i32, away: f64) -> Result<(usize, f64), Broken> {
     ];
     let mut scheme: EventDriven<_> = EventDriven::new(&grains, FLOOR, Domain::unbounded(), smooth(1.0, 1.0), 0.0);
     let mut log = Log::default();
-    run(&mut scheme, 3.0 * away, &mut log)?;
+    // The last hit, when the two are nearly as fast, may come late.
+    run(&mut scheme, 100.0 * away, &mut log)?;
     let drift = kinetic_energy(&states(&scheme, scheme.time())) / (0.5 * mass) - 1.0;
     Ok((log.0.len(), drift.abs()))
 }
@@ -55,41 +56,50 @@ fn galperin(k: i32, away: f64) -> Result<(usize, f64), Broken> {
 fn case_5_galperin_billiard_spells_pi() {
     for (k, hits) in [(0, 3), (1, 31), (2, 314), (3, 3141), (4, 31415), (5, 314_159)] {
         let (counted, drift) = galperin(k, 2.0).expect("no broken invariant");
-        println!("k {k} drift {drift:e}");
         assert_eq!(counted, hits);
         assert!(drift < 1e-10, "k = {k}: {drift:e}");
     }
 }
 
+/// The epoch was as long as its start allowed, and the light grain, 1e4 times as fast in the end, overlapped the heavy one by 1e-9 radii.
 #[test]
-fn galperin_late() {
-    for k in 0..6 {
-        println!("k {k} {:?}", galperin(k, 1e3));
+fn a_light_grain_outran_its_epoch() {
+    for (k, hits) in [(4, 31415), (5, 314_159)] {
+        let (counted, drift) = galperin(k, 1e3).expect("no broken invariant");
+        assert_eq!(counted, hits);
+        assert!(drift < 1e-10, "k = {k}: {drift:e}");
     }
 }
 
-/// Hard case 7: of three free grains the left one hits the two others, which rest. Approach speeds obey
-/// c_{n+1} = (1 + e)/2 c_n - e c_{n-1}: ceil(pi / theta) - 1 hits with cos theta = (1 + e) / (4 √e), and no end where that
-/// exceeds 1, below e = 7 - 4√3 = 0.0718.
-fn three_grains(e: f64, drift: f64) -> Log {
+/// Hard case 7: of three free grains the left one hits the two others, which rest. Hits and relative speeds at the end; all drift at
+/// `drift` (m/s) besides.
+fn three_grains(e: f64, drift: f64) -> (usize, f64) {
     let grains = [(0.0, 1.0), (1.5, 0.0), (2.5, 0.0)].map(|(x, v)| grain(at(x), at(v + drift), 0.5, 1.0));
     let mut scheme = free(&grains, e);
     let mut log = Log::default();
     run(&mut scheme, 1e5, &mut log).expect("no broken invariant");
-    log
+    let v = states(&scheme, 1e5).iter().map(|(flight, _)| flight.velocity.x).collect::<Vec<_>>();
+    (log.0.len(), (v[1] - v[0]).abs().max((v[2] - v[1]).abs()))
 }
 
+/// Approach speeds obey c_{n+1} = (1 + e)/2 c_n - e c_{n-1}: ceil(pi / theta) - 1 hits with cos theta = (1 + e) / (4 √e), and no end
+/// where that exceeds 1, below e = 7 - 4√3 = 0.0718.
 #[test]
 fn case_7_three_free_grains_collapse_below_0_0718() {
-    for e in [0.0719, 0.072, 0.075, 0.08, 0.1, 0.2, 0.5, 0.9] {
-        let expected = (PI / ((1.0 + e) / (4.0 * f64::sqrt(e))).acos()).ceil() as usize - 1;
-        for drift in [-1.0 / 3.0, 0.0, 7.3] {
-            println!("{e} {drift} {} {expected}", three_grains(e, drift).0.len());
+    let drifts = [-1.0 / 3.0, 0.0, 7.3];
+    for e in [0.075, 0.08, 0.1, 0.2, 0.5, 0.9] {
+        let hits = (PI / ((1.0 + e) / (4.0 * f64::sqrt(e))).acos()).ceil() as usize - 1;
+        for drift in drifts {
+            assert_eq!(three_grains(e, drift).0, hits, "e = {e}, drift {drift}");
         }
     }
-    for e in [0.0, 0.01, 0.05, 0.07, 0.0717] {
-        for drift in [-1.0 / 3.0, 0.0, 7.3] {
-            println!("{e} {drift} {}", three_grains(e, drift).0.len());
+    // The slowest relative speed is about e^(n/2): what lies below the rounding of the drift is rest. That comes before the last of the
+    // 89 and 63 hits at 0.0719 and 0.072.
+    for e in [0.0, 0.01, 0.05, 0.07, 0.0717, 0.0719, 0.072] {
+        for drift in drifts {
+            let (hits, relative) = three_grains(e, drift);
+            assert!(hits < 120, "e = {e}, drift {drift}: {hits} hits");
+            assert!(relative < 1e-14 * (1.0 + drift.abs()), "e = {e}, drift {drift}: {relative:e} m/s are left");
         }
     }
 }
@@ -140,17 +150,26 @@ fn ball_on_two(order: &[usize]) -> [Vector3<f64>; 3] {
     [0, 1, 2].map(|k| states[order[k]].0.velocity)
 }
 
+/// The two hits are simultaneous and do not commute: the lower number goes first and gets more. That is reported here, not wished.
 #[test]
 fn case_9_ball_on_two_balls_keeps_its_energy() {
+    let vector = |x: f64, z: f64| Vector3::new(x, 0.0, z);
+    let root = 3f64.sqrt();
     for order in orders(3) {
-        println!("{order:?} {:?}", ball_on_two(&order));
+        let side = if order[1] < order[2] { 1.0 } else { -1.0 };
+        let first = vector(-side * root / 4.0, -0.75);
+        let second = vector(side * root / 8.0, -0.375);
+        let (left, right) = if side > 0.0 { (first, second) } else { (second, first) };
+        for (got, exact) in ball_on_two(&order).iter().zip([vector(side * root / 8.0, 0.125), left, right]) {
+            assert!((got - exact).amax() < 1e-14, "{order:?}: {got} instead of {exact}");
+        }
     }
 }
 
 /// Hard case 12: an overlap that rounding left is resolved at once where the grains approach.
 #[test]
 fn case_12_overlap_that_approaches_hits_at_once() {
-    for overlap in [1e-14, 1e-12, 5e-10] {
+    for overlap in [1e-14, 1e-12, 4e-10] {
         let grains = [grain(at(0.0), at(1.0), 0.5, 1.0), grain(at(1.0 - overlap), at(-1.0), 0.5, 1.0)];
         let mut scheme = free(&grains, 1.0);
         let mut log = Log::default();
@@ -205,11 +224,8 @@ fn overlaps_in_a_gas(events: u64) -> [f64; 2] {
     let mut scheme: EventDriven<_> = EventDriven::new(&grains, NoSurface, domain, smooth(1.0, 1.0), 0.0);
     let mut overlaps = Overlaps { largest: [0.0; 2], seen: 0, of: events };
     while overlaps.seen < events {
-        let end = scheme.epoch_end().min(scheme.time() + 10.0);
+        let end = scheme.time() + 10.0;
         run(&mut scheme, end, &mut overlaps).expect("no broken invariant");
-        if end == scheme.epoch_end() {
-            scheme.start_epoch();
-        }
     }
     overlaps.largest
 }
@@ -217,7 +233,6 @@ fn overlaps_in_a_gas(events: u64) -> [f64; 2] {
 #[test]
 fn case_12_overlaps_do_not_grow() {
     let [first, second] = overlaps_in_a_gas(1_000_000);
-    println!("{first:e} {second:e}");
     assert!(first < 1e-11 && second < 1e-11, "{first:e}, {second:e}");
     assert!(second < 3.0 * first, "{first:e}, {second:e}");
 }
@@ -258,8 +273,8 @@ struct Books {
     mass: f64,
     momentum: Vector3<f64>,
     energy: f64,
-    /// Everything that went through the books, to measure what rounding may leave.
-    turnover: f64,
+    mass_in: f64,
+    energy_in: f64,
     grain_hits: usize,
     surface_hits: usize,
     domain: Option<Domain>,
@@ -284,6 +299,8 @@ impl Observer for Books {
             Passage::Entered => {
                 assert!(self.inside.insert(grain.id), "entered twice: {grain:?}");
                 self.entered += 1;
+                self.mass_in += grain.mass;
+                self.energy_in += energy_of(flight, grain);
                 1.0
             }
             _ => {
@@ -298,7 +315,6 @@ impl Observer for Books {
         self.mass += sign * grain.mass;
         self.momentum += flight.velocity * (sign * grain.mass);
         self.energy += sign * energy_of(flight, grain);
-        self.turnover += energy_of(flight, grain);
     }
 }
 
@@ -315,7 +331,7 @@ fn case_19_no_event_of_a_grain_that_has_left() {
     let mut scheme: EventDriven<_> = EventDriven::new(&[], FLOOR, domain, smooth(0.8, 0.7), 0.0);
     let mut books = Books { domain: Some(domain), ..Books::default() };
     let mut random = rand_pcg::Pcg64::seed_from_u64(19);
-    let (step, mut most) = (1e-4, 0);
+    let step = 1e-4;
     for k in 1..=60_000 {
         let time = f64::from(k) * step;
         run(&mut scheme, time, &mut books).expect("no broken invariant");
@@ -329,51 +345,66 @@ fn case_19_no_event_of_a_grain_that_has_left() {
             );
             scheme.enter(time, &grain(position, velocity, radius, 1e3 * radius.powi(3)), &mut books);
         }
-        most = most.max(books.inside.len());
     }
     let states = states(&scheme, scheme.time());
     assert_eq!((states.len(), books.inside.len()), (books.entered - books.left, states.len()));
-    println!("{} {} most {most} grain {} surface {} ", books.entered, books.left, books.grain_hits, books.surface_hits);
     assert!(books.entered > 20_000 && books.grain_hits > 20_000 && books.surface_hits > 10_000);
     let mass: f64 = states.iter().map(|(_, mass)| mass).sum();
     let momentum: Vector3<f64> = states.iter().map(|(flight, mass)| flight.velocity * *mass).sum();
     let energy = kinetic_energy(&states);
-    println!(
-        "{:e} {:e} {:e}",
-        mass - books.mass,
-        (momentum - books.momentum).amax(),
-        (energy - books.energy) / books.turnover
-    );
-    assert!((energy - books.energy).abs() < 1e-12 * books.turnover);
+    // 25000 grains of up to 0.125 kg and 10 m/s went through these books.
+    assert!((mass - books.mass).abs() < 1e-12 * books.mass_in, "mass {:e}", mass - books.mass);
+    let lost = (momentum - books.momentum).amax();
+    assert!(lost < 1e-12 * 10.0 * books.mass_in, "momentum {lost:e}");
+    let lost = (energy - books.energy).abs();
+    assert!(lost < 1e-12 * books.energy_in, "energy {lost:e} of {:e}", books.energy_in);
 }
 
+/// Numbers of grains that have left are given again: a grain that enters where another left must not inherit its hit order.
 #[test]
-fn dbg_fast_entry() {
-    let domain = Domain { min: Vector3::repeat(-1e9), max: Vector3::repeat(1e9), periodic: false, planar: false };
-    let slow = [
-        grain(Vector3::new(0.0, 0.0, 5.0), at(1e-6), 0.01, 1.0),
-        grain(Vector3::new(1.0, 0.0, 5.0), at(1e-6), 0.01, 1.0),
-    ];
+fn a_grain_that_enters_has_not_hit_yet() {
+    let domain = Domain { min: Vector3::repeat(-1.0), max: Vector3::repeat(1.0), periodic: false, planar: false };
+    let mut scheme: EventDriven<_> = EventDriven::new(&[], FLOOR, domain, smooth(1.0, 1.0), 0.0);
+    let mut log = Log::default();
+    for k in 0..5 {
+        let time = f64::from(k) * 4.0;
+        run(&mut scheme, time, &mut log).expect("no broken invariant");
+        scheme.enter(time, &grain(Vector3::z() * 0.9, -Vector3::z(), 0.1, 1.0), &mut log);
+    }
+    run(&mut scheme, 20.0, &mut log).expect("no broken invariant");
+    let hits: Vec<_> =
+        log.0.iter().map(|hit| if let Hit::Surface(hit) = hit { (hit.id, hit.order) } else { (99, 99) }).collect();
+    assert_eq!(hits, [(0, 1), (1, 1), (2, 1), (3, 1), (4, 1)]);
+}
+
+/// An epoch of a scene that is slow or empty is long, and late in it times are coarse: at t = 1e6 s they are 1e-10 s apart, in which a grain of
+/// 80 m/s moves by 1e-6 radii of 1 cm.
+#[test]
+fn a_fast_grain_entered_a_long_epoch() {
+    let slow =
+        [grain(Vector3::z() * 5.0, at(1e-6), 0.01, 1.0), grain(Vector3::new(1.0, 0.0, 5.0), at(1e-6), 0.01, 1.0)];
     for grains in [&slow[..], &[]] {
-        let mut scheme: EventDriven<_> = EventDriven::new(grains, FLOOR, domain, smooth(0.8, 0.7), 0.0);
-        run(&mut scheme, 1e6 + 0.1, &mut ()).unwrap();
+        let mut scheme: EventDriven<_> = EventDriven::new(grains, FLOOR, Domain::unbounded(), smooth(0.8, 0.7), 0.0);
+        let (start, mut log) = (1e6 + 0.1, Log::default());
+        run(&mut scheme, start, &mut log).expect("no broken invariant");
         for k in 0..20 {
-            let p = Vector3::new(0.0, 3.0, 1.0 + f64::from(k) * 0.1 * PI);
-            scheme.enter(1e6 + 0.1, &grain(p, Vector3::z() * -(80.0 + f64::from(k) * PI), 0.01, 1.0), &mut ());
+            let position = Vector3::new(0.0, 3.0, 1.0 + f64::from(k) * 0.1 * PI);
+            let velocity = Vector3::z() * -(80.0 + f64::from(k) * PI);
+            scheme.enter(start, &grain(position, velocity, 0.01, 1.0), &mut log);
         }
-        println!("{:?}", run(&mut scheme, 1e6 + 1.0, &mut ()));
+        run(&mut scheme, start + 1.0, &mut log).expect("no broken invariant");
+        assert!(log.surface_hits() >= 20 && log.largest_miss() < 1e-11, "{:e}", log.largest_miss());
     }
 }
 
+/// So too where all grains rest and a surface moves.
 #[test]
-fn dbg_moving_plane() {
+fn a_moving_plane_came_late_in_a_long_epoch() {
     let plane = Plane { point: Vector3::z() * -1e5, velocity: Vector3::z() * 0.3, ..FLOOR };
-    let mut scheme: EventDriven<_> = EventDriven::new(
-        &[grain(Vector3::z(), Vector3::zeros(), 0.01, 1.0)],
-        plane,
-        Domain::unbounded(),
-        smooth(0.8, 0.7),
-        0.0,
-    );
-    println!("{:?}", run(&mut scheme, 1e6, &mut ()));
+    let grains = [0.1, PI, 7.0 / 3.0].map(|x| grain(Vector3::new(x, 0.0, x.sin()), Vector3::zeros(), 1e-4, 1.0));
+    let mut scheme: EventDriven<_> = EventDriven::new(&grains, plane, Domain::unbounded(), smooth(0.8, 0.7), 0.0);
+    let mut log = Log::default();
+    run(&mut scheme, 1e6, &mut log).expect("no broken invariant");
+    assert_eq!(log.0.len(), 3);
+    assert!(log.largest_miss() < 1e-11, "{:e}", log.largest_miss());
 }

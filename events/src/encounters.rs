@@ -380,8 +380,9 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
 
     #[inline]
     fn search(&self, grain: u32) -> Search<'_> {
-        let best = self.plans[grain as usize].pair;
-        Search { grain, flights: &self.flights, plans: &self.plans, horizon: self.horizon, best }
+        let (flight, plan) = (self.flights[grain as usize], &self.plans[grain as usize]);
+        let limit = plan.side.time.min(self.horizon);
+        Search { grain, flight, limit, flights: &self.flights, plans: &self.plans, best: plan.pair }
     }
 
     /// Puts a meeting into the plans of both grains, and leaves the one that `grain` or its new partner had in mind before.
@@ -439,9 +440,11 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
 /// A search for the first grain that `grain` meets.
 struct Search<'a> {
     grain: u32,
+    flight: Flight,
+    /// When something else than a grain stops the search, s.
+    limit: f64,
     flights: &'a [Flight],
     plans: &'a [Plan],
-    horizon: f64,
     /// The best so far.
     best: Event,
 }
@@ -452,16 +455,16 @@ impl Search<'_> {
     /// What `other` has planned earlier will deflect it, and then it looks for itself; so does whoever it leaves.
     #[inline]
     fn consider(&mut self, other: u32, shift: Vector3<f64>) {
-        let (grain, i, j) = (self.grain, self.grain as usize, other as usize);
-        let Some(time) = sphere_sphere(&self.flights[i], &self.flights[j], shift) else { return };
-        if time > self.best.time || time > self.horizon {
+        let Some(time) = sphere_sphere(&self.flight, &self.flights[other as usize], shift) else { return };
+        if time > self.best.time || time > self.limit {
             return;
         }
         let event = Event { time, kind: Kind::Grains, partner: other };
-        if event.is_before(grain, &self.best, grain)
-            && event.is_before(grain, &self.plans[j].pair, other)
-            && event.is_before(grain, &self.plans[i].side, grain)
-            && event.is_before(grain, &self.plans[j].side, other)
+        let theirs = &self.plans[other as usize];
+        // A meeting comes before the surface and the exit of either where the times are equal: the order of kinds.
+        if event.is_before(self.grain, &self.best, self.grain)
+            && event.is_before(self.grain, &theirs.pair, other)
+            && time <= theirs.side.time
         {
             self.best = event;
         }

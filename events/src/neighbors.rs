@@ -38,11 +38,12 @@ fn contact_width(largest_radius: f64) -> f64 {
 struct Place {
     /// Cell along each axis; counts on beyond the period.
     cell: Vector3<i32>,
+    slot: u32,
     next: u32,
     previous: u32,
 }
 
-const NOWHERE: Place = Place { cell: Vector3::new(0, 0, 0), next: NOBODY, previous: NOBODY };
+const NOWHERE: Place = Place { cell: Vector3::new(0, 0, 0), slot: 0, next: NOBODY, previous: NOBODY };
 
 /// A crossing: when, and into which cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -157,8 +158,8 @@ impl Cells {
     fn link(&mut self, id: u32) {
         let slot = self.slot_of(self.places[id as usize].cell);
         let first = std::mem::replace(&mut self.heads[slot], id);
-        self.places[id as usize].next = first;
-        self.places[id as usize].previous = NOBODY;
+        let place = &mut self.places[id as usize];
+        (place.slot, place.next, place.previous) = (slot as u32, first, NOBODY);
         if first != NOBODY {
             self.places[first as usize].previous = id;
         }
@@ -166,10 +167,9 @@ impl Cells {
 
     /// Takes grain `id` out.
     pub(crate) fn remove(&mut self, id: u32) {
-        let Place { cell, next, previous } = self.places[id as usize];
+        let Place { slot, next, previous, .. } = self.places[id as usize];
         if previous == NOBODY {
-            let slot = self.slot_of(cell);
-            self.heads[slot] = next;
+            self.heads[slot as usize] = next;
         } else {
             self.places[previous as usize].next = next;
         }

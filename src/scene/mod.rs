@@ -3,8 +3,22 @@
 //! Everything is in SI units. Each struct is one table of the file; each field is one key, and its doc comment is what
 //! `impinge schema` says about it.
 
+mod check;
+mod contact;
+mod error;
+mod key;
+mod later;
+mod load;
+mod shape;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+pub use check::{check, check_radius};
+pub use contact::{Contact, Contacts, Friction, Regularised, StaticDynamic};
+pub use error::{Invalid, SceneError};
+pub use load::{Overrides, SceneFile};
+pub use shape::schema;
 
 /// A vector as it stands in the file: `[x, y, z]`.
 pub type Vec3 = [f64; 3];
@@ -157,66 +171,6 @@ pub enum Distribution {
     Normal,
     /// The logarithm is Gaussian; `mean` and `cv` are those of the radius itself.
     Lognormal,
-}
-
-/// `[contact]`
-#[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema, PartialEq)]
-#[serde(deny_unknown_fields)]
-pub struct Contacts {
-    /// Between two grains; needed unless `interference = "none"`.
-    pub grain: Option<Contact>,
-    /// Between a grain and the surface; needed where there is a surface.
-    pub surface: Option<Contact>,
-}
-
-/// `[contact.grain]` or `[contact.surface]`
-#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema, PartialEq)]
-#[serde(deny_unknown_fields)]
-pub struct Contact {
-    /// Normal restitution e, from 0 (nothing comes back) to 1 (elastic).
-    pub restitution: f64,
-    /// Coulomb friction; left out, the contact is smooth and grains do not spin.
-    #[serde(default)]
-    pub friction: Friction,
-}
-
-/// Friction at a contact.
-#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema, PartialEq)]
-#[serde(untagged)]
-pub enum Friction {
-    /// One coefficient, static and dynamic.
-    Coefficient(f64),
-    /// Two coefficients (Arbelaez et al. 2009, eq. 20 and 32).
-    StaticDynamic(StaticDynamic),
-    /// The regularised law of Mukherjee & Zohdi (2015), eq. 11 and 12.
-    Regularised(Regularised),
-}
-
-impl Default for Friction {
-    fn default() -> Self {
-        Self::Coefficient(0.0)
-    }
-}
-
-/// Static and dynamic friction.
-#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema, PartialEq)]
-#[serde(deny_unknown_fields)]
-pub struct StaticDynamic {
-    /// mu_s: up to this traction the contact sticks.
-    #[serde(rename = "static")]
-    pub static_: f64,
-    /// mu_d: the traction of a slipping contact; at most mu_s.
-    pub dynamic: f64,
-}
-
-/// Regularised friction.
-#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema, PartialEq)]
-#[serde(deny_unknown_fields)]
-pub struct Regularised {
-    /// mu, approached at large slip.
-    pub coefficient: f64,
-    /// epsilon: slip speed below which the traction falls linearly to zero, m/s.
-    pub slip_speed: f64,
 }
 
 /// `[[source]]`
@@ -374,7 +328,7 @@ pub enum NozzleShape {
 
 /// How much comes out of a nozzle.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema, PartialEq)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Flow {
     /// Volume fraction at the opening (in a planar scene the area fraction).
     VolumeFraction(f64),
@@ -529,25 +483,4 @@ fn default_samples() -> u32 {
 
 fn yes() -> bool {
     true
-}
-
-/// A value that cannot be used: which key, what is wrong with it, and what to do about it.
-///
-/// `key` is the path of the value in the scene file, as in `source[1].count` or `contact.grain.restitution`.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{key}: {what}")]
-pub struct Invalid {
-    /// Path of the key in the scene file.
-    pub key: String,
-    /// What is wrong, with the value.
-    pub what: String,
-    /// What to do about it.
-    pub remedy: String,
-}
-
-impl Invalid {
-    /// A value at `key` that cannot be used.
-    pub fn new(key: impl Into<String>, what: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self { key: key.into(), what: what.into(), remedy: remedy.into() }
-    }
 }

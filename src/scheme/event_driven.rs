@@ -22,6 +22,11 @@ const OUTRUN: f64 = 8.0;
 const LONGEST_EPOCH: f64 = 1000.0;
 /// Overlap at an event, over the smaller radius, above which a run is wrong and stops. Rounding leaves about 1e-13.
 pub const LARGEST_OVERLAP: f64 = 1e-9;
+/// A run is jammed when so many encounters a grain, and [`JAM_ENCOUNTERS`] more, happen while time goes on by less than
+/// [`JAM_TIME`] of an epoch (0.004 radii of flight of the fastest grain). A grain wedged in by a moving surface has no other future.
+const JAM_ENCOUNTERS_PER_GRAIN: u64 = 1000;
+const JAM_ENCOUNTERS: u64 = 1_000_000;
+const JAM_TIME: f64 = 1.0 / (1u64 << 20) as f64;
 /// Encounters between two looks at the watch (progress, Ctrl-C).
 const ENCOUNTERS_PER_WATCH: u32 = 4096;
 
@@ -59,6 +64,9 @@ pub struct EventDriven<S: Surface, C: Calendar = Tournament> {
     entered: u64,
     collisions: u64,
     since_watch: u32,
+    /// Encounters since `mark` (epoch time, s).
+    since_mark: u64,
+    mark: f64,
 }
 
 impl<S: Surface, C: Calendar> EventDriven<S, C> {
@@ -86,6 +94,8 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             entered,
             collisions: 0,
             since_watch: 0,
+            since_mark: 0,
+            mark: 0.0,
         };
         scheme.start_epoch(0.0);
         scheme
@@ -118,6 +128,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.epoch_start += after;
         self.epoch = next;
         self.outrun = false;
+        (self.mark, self.since_mark) = (0.0, 0);
     }
 
     /// Resolves all events up to simulated time `end` (s). When and how often it is called changes nothing of what happens.
@@ -141,6 +152,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
                 self.start_epoch(self.epoch);
                 continue;
             };
+            self.watch_for_jam(time, encounter)?;
             match encounter {
                 Encounter::Grains { a, b } => self.collide(time, a, b, observer)?,
                 Encounter::Surface { grain, element } => self.hit(time, grain, element, observer)?,
@@ -161,6 +173,23 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         }
         self.time = end;
         Ok(watch(self.progress()))
+    }
+
+    /// Stops a run in which time no longer goes on.
+    #[inline]
+    fn watch_for_jam(&mut self, time: f64, encounter: Encounter) -> Result<(), Broken> {
+        self.since_mark += 1;
+        if time > self.mark + JAM_TIME * self.epoch {
+            (self.mark, self.since_mark) = (time, 0);
+        } else if self.since_mark > JAM_ENCOUNTERS + JAM_ENCOUNTERS_PER_GRAIN * self.grains.len() as u64 {
+            let slots = match encounter {
+                Encounter::Grains { a, b } => vec![a, b],
+                Encounter::Surface { grain, .. } | Encounter::Exit { grain } => vec![grain],
+            };
+            let grains = slots.iter().map(|&slot| self.grains[slot as usize].id).collect();
+            return Err(Broken::Jammed { time: self.epoch_start + time, grains, encounters: self.since_mark });
+        }
+        Ok(())
     }
 
     fn progress(&self) -> Progress {
@@ -188,6 +217,11 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             return Ok(());
         }
         let contact = resolve_pair(&self.laws.grain, &first, &second, normal);
+        // Where rounding has turned the slightest graze into none, both fly on.
+        if contact.impulse.normal == 0.0 {
+            self.encounters.deflect(&[(a, first.velocity), (b, second.velocity)]);
+            return Ok(());
+        }
         let [after_a, after_b] = contact.after;
         self.check(time, &ids, overlap_over_radius, &[after_a.velocity, after_b.velocity])?;
         self.grains[a as usize].spin = after_a.spin;
@@ -214,6 +248,10 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let flight = *self.encounters.flight(grain);
         let contact = self.encounters.surface().contact(element, &flight);
         let resolved = resolve_surface(&self.laws.surface, &before, contact.normal, contact.velocity);
+        if resolved.impulse.normal == 0.0 {
+            self.encounters.deflect(&[(grain, before.velocity)]);
+            return Ok(());
+        }
         let id = self.grains[grain as usize].id;
         let overlap_over_radius = -contact.gap / before.radius;
         self.check(time, &[id], overlap_over_radius, &[resolved.after.velocity])?;

@@ -35,6 +35,16 @@ pub enum Broken {
         /// Overlap over the smaller radius.
         overlap: f64,
     },
+    /// Collisions without end, while time stands still.
+    #[error("at t = {time} s grain {} is jammed: {encounters} collisions and no time goes by", list(grains))]
+    Jammed {
+        /// Simulated time, s.
+        time: f64,
+        /// Ids of the grains that collided last.
+        grains: Vec<u64>,
+        /// Collisions at this time.
+        encounters: u64,
+    },
     /// A velocity is no finite number.
     #[error("at t = {time} s the velocity of grain {} is no finite number", list(grains))]
     NotANumber {

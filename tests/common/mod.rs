@@ -116,6 +116,15 @@ impl Log {
     pub fn surface_hits(&self) -> usize {
         self.0.len() - self.grain_hits()
     }
+
+    /// Largest overlap or gap at an event, over the radius.
+    pub fn largest_miss(&self) -> f64 {
+        let overlap = |hit: &Hit| match hit {
+            Hit::Grains(hit) => hit.overlap_over_radius,
+            Hit::Surface(hit) => hit.overlap_over_radius,
+        };
+        self.0.iter().map(|hit| overlap(hit).abs()).fold(0.0, f64::max)
+    }
 }
 
 impl Observer for Log {

@@ -27,42 +27,44 @@ pub struct Tournament {
     events: Vec<Event>,
 }
 
+/// The winner of a match.
+#[inline]
+fn earlier(left: Entry, right: Entry, events: &[Event]) -> Entry {
+    if left.time < right.time {
+        left
+    } else if right.time < left.time {
+        right
+    } else {
+        earlier_of_simultaneous(left, right, events)
+    }
+}
+
+#[cold]
+fn earlier_of_simultaneous(left: Entry, right: Entry, events: &[Event]) -> Entry {
+    let event = |entry: Entry| events.get(entry.owner as usize).unwrap_or(&NO_EVENT);
+    match event(left).order(left.owner, event(right), right.owner) {
+        Ordering::Greater => right,
+        _ => left,
+    }
+}
+
 impl Tournament {
-    #[inline]
-    fn earlier(&self, left: Entry, right: Entry) -> Entry {
-        if left.time < right.time {
-            left
-        } else if right.time < left.time {
-            right
-        } else {
-            self.earlier_of_simultaneous(left, right)
-        }
-    }
-
-    #[cold]
-    fn earlier_of_simultaneous(&self, left: Entry, right: Entry) -> Entry {
-        let event = |entry: Entry| self.events.get(entry.owner as usize).unwrap_or(&NO_EVENT);
-        match event(left).order(left.owner, event(right), right.owner) {
-            Ordering::Greater => right,
-            _ => left,
-        }
-    }
-
     /// Replays the matches of `owner`.
     #[inline]
     fn replay(&mut self, owner: u32, entry: Entry) {
-        let mut node = self.leaves + owner as usize;
+        let Self { nodes, events, leaves } = self;
+        let nodes = nodes.as_mut_slice();
+        let mut node = *leaves + owner as usize;
         let mut winner = entry;
-        self.nodes[node] = winner;
+        nodes[node] = winner;
         while node > 1 {
-            winner = self.earlier(winner, self.nodes[node ^ 1]);
+            winner = earlier(winner, nodes[node ^ 1], events);
             node /= 2;
-            let match_ = &mut self.nodes[node];
             // The same owner at the same time may be another event, and stand elsewhere among simultaneous ones.
-            if *match_ == winner && winner.owner != owner {
+            if winner.owner != owner && nodes[node] == winner {
                 break;
             }
-            *match_ = winner;
+            nodes[node] = winner;
         }
     }
 }
@@ -82,7 +84,7 @@ impl Calendar for Tournament {
             }
         }
         for node in (1..self.leaves).rev() {
-            self.nodes[node] = self.earlier(self.nodes[2 * node], self.nodes[2 * node + 1]);
+            self.nodes[node] = earlier(self.nodes[2 * node], self.nodes[2 * node + 1], &self.events);
         }
     }
 

@@ -29,9 +29,14 @@ use crate::Flight;
 #[inline]
 #[must_use]
 pub fn sphere_sphere(a: &Flight, b: &Flight, shift: Vector3<f64>) -> Option<f64> {
-    let base = a.time.max(b.time);
-    let r = (b.position_at(base) - a.position_at(base)) + shift;
     let v = b.velocity - a.velocity;
+    // Whoever is at the later time is where its state says.
+    let (base, r) = if a.time >= b.time {
+        (a.time, b.position_at(a.time) - a.position)
+    } else {
+        (b.time, b.position - a.position_at(b.time))
+    };
+    let r = r + shift;
     let approach = -r.dot(&v);
     if approach > 0.0 {
         let v2 = v.norm_squared();

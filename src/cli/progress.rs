@@ -1,0 +1,71 @@
+//! The line that shows how far a run is.
+
+use std::time::{Duration, Instant};
+
+use impinge::scene::Run;
+use impinge::scheme::Progress;
+use indicatif::{HumanCount, HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+/// How often the line changes: often enough to look alive, too seldom to cost the run anything.
+const INTERVAL: Duration = Duration::from_millis(100);
+
+/// Steps of the bar from start to end.
+const STEPS: f64 = 1000.0;
+
+/// Percent, simulated time, collisions, speed and time left, on standard error; nothing when that is no terminal.
+pub(super) struct ProgressLine {
+    bar: ProgressBar,
+    start: f64,
+    until: f64,
+    began: Instant,
+    shown: Option<Instant>,
+}
+
+impl ProgressLine {
+    pub(super) fn new(run: &Run, quiet: bool) -> Self {
+        let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+        let style = ProgressStyle::with_template("{percent:>3} % [{bar:30}] {msg}").expect("the template is right");
+        let bar = ProgressBar::with_draw_target(Some(STEPS as u64), target).with_style(style.progress_chars("=> "));
+        Self { bar, start: run.start, until: run.until, began: Instant::now(), shown: None }
+    }
+
+    pub(super) fn show(&mut self, progress: &Progress) {
+        if self.bar.is_hidden() || self.shown.is_some_and(|shown| shown.elapsed() < INTERVAL) {
+            return;
+        }
+        self.shown = Some(Instant::now());
+        let done = ((progress.time - self.start) / (self.until - self.start)).clamp(0.0, 1.0);
+        self.bar.set_message(describe(progress, done, self.began.elapsed().as_secs_f64()));
+        self.bar.set_position((done * STEPS) as u64);
+    }
+
+    /// Takes the line away, so that nothing of it mixes with the results.
+    pub(super) fn clear(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+/// `done` is the simulated part of the run, 0 to 1; `elapsed` the time on the clock, s.
+fn describe(progress: &Progress, done: f64, elapsed: f64) -> String {
+    let speed = progress.collisions as f64 / elapsed.max(f64::MIN_POSITIVE);
+    let left = match Duration::try_from_secs_f64(elapsed * (1.0 - done) / done) {
+        Ok(left) => format!("{} left", HumanDuration(left)),
+        Err(_) => "time left unknown".to_owned(),
+    };
+    let collisions = HumanCount(progress.collisions);
+    format!("t = {:.4e} s, {collisions} collisions, {} per second, {left}", progress.time, HumanCount(speed as u64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_left_is_in_proportion_and_unknown_at_the_start() {
+        let progress = Progress { time: 0.5, collisions: 3000, inside: 10 };
+        let text = describe(&progress, 0.25, 2.0);
+        assert_eq!(text, "t = 5.0000e-1 s, 3,000 collisions, 1,500 per second, 6 seconds left");
+        assert!(describe(&progress, 0.0, 0.0).ends_with("time left unknown"));
+        assert!(describe(&progress, 0.0, 1.0).ends_with("time left unknown"));
+    }
+}

@@ -1,0 +1,92 @@
+//! `impinge run`
+
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use cpu_time::ProcessTime;
+use impinge::output::{self, Folder, Recorder};
+use impinge::simulation::Simulation;
+use impinge::source::Nozzle;
+use miette::{Report, miette};
+
+use super::progress::ProgressLine;
+use super::{Ending, Failure, SceneArgs, print};
+
+#[derive(clap::Args)]
+pub(super) struct Args {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Folder for the results [default: the scene's name, in the current folder].
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Replace the results of an earlier run in that folder.
+    #[arg(long)]
+    force: bool,
+    /// Show no progress.
+    #[arg(long)]
+    quiet: bool,
+}
+
+impl Args {
+    fn folder(&self) -> PathBuf {
+        self.output.clone().unwrap_or_else(|| PathBuf::from(self.scene.scene.file_stem().unwrap_or_default()))
+    }
+}
+
+/// Runs a scene.
+pub(super) fn run(args: &Args) -> Result<Ending, Failure> {
+    let file = args.scene.read()?;
+    let (clock, processor) = (Instant::now(), ProcessTime::now());
+    let mut simulation = Simulation::new(&file.scene, file.folder()).map_err(|invalid| file.locate(invalid))?;
+    let folder = Folder::begin(&args.folder(), args.force).map_err(|error| Failure::Input(report(&error)))?;
+    let mut recorder = Recorder::new(&file.scene, simulation.surface().into(), folder)
+        .map_err(|error| Failure::Run(report(&error)))?;
+
+    let (interrupted, failed) = (catch_interrupt()?, recorder.failure_flag());
+    let mut line = ProgressLine::new(&file.scene.run, args.quiet);
+    let run = simulation.run(&mut recorder, &mut |progress| {
+        line.show(&progress);
+        let stop = interrupted.load(Ordering::Relaxed) || failed.load(Ordering::Relaxed);
+        if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    line.clear();
+
+    let outcome = match run {
+        Ok(outcome) => outcome,
+        Err(broken) => {
+            let kept = recorder.abandon().map_err(|error| Failure::Run(report(&error)))?;
+            let help = format!("what was measured until then is in {}; please report the scene", kept.display());
+            return Err(Failure::Run(miette!(help = help, "{broken}")));
+        }
+    };
+    let outcome = output::Outcome {
+        interrupted: outcome.interrupted,
+        entries_deferred: simulation.nozzles().iter().map(Nozzle::deferred).sum(),
+        cpu_seconds: processor.elapsed().as_secs_f64(),
+        wall_seconds: clock.elapsed().as_secs_f64(),
+    };
+    let (summary, written) = recorder.finish(&outcome).map_err(|error| Failure::Run(report(&error)))?;
+    print(&format!("{summary}\nwritten to {}\n", written.display()))?;
+    Ok(if outcome.interrupted { Ending::Interrupted } else { Ending::Done })
+}
+
+/// An output error with its remedy.
+fn report(error: &output::Error) -> Report {
+    miette!(help = error.remedy(), "{error}")
+}
+
+/// A flag that Ctrl-C raises; the run stops at its next look. A second Ctrl-C does not wait for that.
+fn catch_interrupt() -> Result<Arc<AtomicBool>, Failure> {
+    let flag = Arc::new(AtomicBool::new(false));
+    let raised = Arc::clone(&flag);
+    ctrlc::set_handler(move || {
+        if raised.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    })
+    .map_err(|error| Failure::Run(miette!("cannot listen for Ctrl-C: {error}")))?;
+    Ok(flag)
+}

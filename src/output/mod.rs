@@ -1,0 +1,17 @@
+//! What a run leaves behind: one format a file, all in one folder.
+//!
+//! [`Folder`] keeps earlier results safe, [`Recorder`] watches the run and writes, [`Summary`] is what it came to.
+
+mod error;
+mod folder;
+pub mod plots;
+mod recorder;
+mod summary;
+mod tables;
+pub mod vtk;
+
+pub use error::Error;
+pub use folder::Folder;
+pub use recorder::{Outcome, Recorder};
+pub use summary::Summary;
+pub use tables::EventTable;

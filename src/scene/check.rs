@@ -1,0 +1,261 @@
+//! Does the scene make sense? Everything that can be told without building its sources and surfaces.
+
+use toml::Value;
+
+use super::{Arrangement, Boundary, Contact, Friction, Interference, Invalid, Radius, Scene, Source, Surface, Vec3};
+
+/// Most grains that blocks and lattices of one scene may ask for. At the 600 bytes that a grain costs they fill 60 GB; more is
+/// a misplaced exponent, and is better refused than tried.
+const GRAINS_MAX: u64 = 100_000_000;
+
+/// Most rows of the time history and most frames: each frame is a file, each row a look at all grains.
+const ROWS_MAX: u32 = 10_000_000;
+
+/// Smallest side of a periodic domain over the largest radius. A side of two diameters makes sure that a pair can touch
+/// through one side only, never through two opposite ones at a time.
+const PERIODIC_SIDE_OVER_RADIUS: f64 = 4.0;
+
+type Checked = Result<(), Invalid>;
+
+/// Validates all of a scene that belongs to no single source or surface.
+///
+/// # Errors
+/// The first value that cannot be used.
+pub fn check(scene: &Scene) -> Checked {
+    finite(scene)?;
+    run(scene)?;
+    domain(scene)?;
+    check_radius("grain.radius", &scene.grain.radius)?;
+    positive("grain.density", scene.grain.density, "kg/m³")?;
+    contacts(scene)?;
+    sources(scene)?;
+    if scene.domain.planar { planar(scene) } else { Ok(()) }
+}
+
+/// Validates a radius that stands at `key`.
+///
+/// # Errors
+/// A radius that is not above 0, or a spread with which radii at or below 0 could be drawn.
+pub fn check_radius(key: &str, radius: &Radius) -> Checked {
+    let drawn = match radius {
+        Radius::Constant(radius) => return positive(key, *radius, "m"),
+        Radius::Drawn(drawn) => drawn,
+    };
+    positive(&format!("{key}.mean"), drawn.mean, "m")?;
+    let widest = match drawn.distribution {
+        super::Distribution::Uniform => 1.0 / 3.0_f64.sqrt(),
+        super::Distribution::Normal => 1.0 / 3.0,
+        super::Distribution::Lognormal => f64::INFINITY,
+    };
+    if (0.0..widest).contains(&drawn.cv) {
+        return Ok(());
+    }
+    let remedy = match widest.is_finite() {
+        true => format!("use 0 or more and less than {widest:.4}, or `distribution = \"lognormal\"`"),
+        false => "use 0 or more".to_owned(),
+    };
+    Err(Invalid::new(
+        format!("{key}.cv"),
+        format!("a coefficient of variation of {} is outside what this distribution allows", drawn.cv),
+        remedy,
+    ))
+}
+
+/// No number anywhere is NaN or infinite: found by walking the scene as it would be written back.
+fn finite(scene: &Scene) -> Checked {
+    let tree = Value::try_from(scene).map_err(|error| {
+        Invalid::new("seed", format!("{} cannot stand in a file: {error}", scene.seed), "use a smaller one")
+    })?;
+    all_finite(&tree, "")
+}
+
+fn all_finite(value: &Value, path: &str) -> Checked {
+    match value {
+        Value::Float(number) if !number.is_finite() => Err(Invalid::new(
+            path,
+            format!("{number} is no finite number"),
+            "give a finite number, or leave the key out",
+        )),
+        Value::Table(table) => table.iter().try_for_each(|(name, value)| match path {
+            "" => all_finite(value, name),
+            _ => all_finite(value, &format!("{path}.{name}")),
+        }),
+        Value::Array(array) => {
+            array.iter().enumerate().try_for_each(|(i, value)| all_finite(value, &format!("{path}[{i}]")))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn run(scene: &Scene) -> Checked {
+    let run = &scene.run;
+    if run.until <= run.start {
+        let what = format!("{} s is not after the start at {} s", run.until, run.start);
+        return Err(Invalid::new("run.until", what, "give a later end, or an earlier `run.start`"));
+    }
+    for (key, rows) in [("run.frames", run.frames), ("output.samples", scene.output.samples)] {
+        if rows > ROWS_MAX {
+            let what = format!("{rows} are more than anyone can use");
+            return Err(Invalid::new(key, what, format!("use at most {ROWS_MAX}")));
+        }
+    }
+    Ok(())
+}
+
+fn domain(scene: &Scene) -> Checked {
+    let domain = &scene.domain;
+    for (i, axis) in ["x", "y", "z"].into_iter().enumerate().filter(|&(_, axis)| !(domain.planar && axis == "y")) {
+        let side = domain.max[i] - domain.min[i];
+        if !side.is_finite() || side <= 0.0 {
+            let what = format!("along {axis} the domain reaches from {} to {} m", domain.min[i], domain.max[i]);
+            return Err(Invalid::new(format!("domain.max[{i}]"), what, "`min` must be below `max` on every axis"));
+        }
+        let Radius::Constant(radius) = scene.grain.radius else { continue };
+        let least = PERIODIC_SIDE_OVER_RADIUS * radius;
+        if domain.boundary == Boundary::Periodic && side < least {
+            let what = format!("along {axis} the periodic domain is {side} m wide, less than two grain diameters");
+            return Err(Invalid::new(format!("domain.max[{i}]"), what, format!("make it at least {least} m wide")));
+        }
+    }
+    Ok(())
+}
+
+fn contacts(scene: &Scene) -> Checked {
+    let pairs = scene.run.interference != Interference::None;
+    let surface = !scene.surface.is_empty();
+    let contacts = [
+        (
+            "grain",
+            &scene.contact.grain,
+            pairs,
+            "grains collide with each other; without, set `run.interference = \"none\"`",
+        ),
+        ("surface", &scene.contact.surface, surface, "the scene has a surface"),
+    ];
+    for (name, contact, needed, why) in contacts {
+        let key = format!("contact.{name}");
+        match contact {
+            Some(contact) => check_contact(&key, contact)?,
+            None if needed => {
+                let remedy = format!("add `[{key}]` with `restitution = ...`: {why}");
+                return Err(Invalid::new(&key, format!("missing table `[{key}]`"), remedy));
+            }
+            None => {}
+        }
+    }
+    Ok(())
+}
+
+fn check_contact(key: &str, contact: &Contact) -> Checked {
+    let e = contact.restitution;
+    if !(0.0..=1.0).contains(&e) {
+        let remedy = "use a number from 0 (nothing comes back) to 1 (elastic)";
+        return Err(Invalid::new(format!("{key}.restitution"), format!("{e} is outside [0, 1]"), remedy));
+    }
+    let key = format!("{key}.friction");
+    match contact.friction {
+        Friction::Coefficient(mu) => not_negative(&key, mu),
+        Friction::StaticDynamic(mu) => {
+            not_negative(&format!("{key}.static"), mu.static_)?;
+            not_negative(&format!("{key}.dynamic"), mu.dynamic)?;
+            if mu.dynamic > mu.static_ {
+                let what = format!("{} is above the static friction {}", mu.dynamic, mu.static_);
+                return Err(Invalid::new(
+                    format!("{key}.dynamic"),
+                    what,
+                    "dynamic friction is at most static friction",
+                ));
+            }
+            Ok(())
+        }
+        Friction::Regularised(law) => {
+            not_negative(&format!("{key}.coefficient"), law.coefficient)?;
+            positive(&format!("{key}.slip_speed"), law.slip_speed, "m/s")
+        }
+    }
+}
+
+fn sources(scene: &Scene) -> Checked {
+    if scene.source.is_empty() {
+        let remedy = "add `[[source]]` with a `kind`: \"file\", \"block\", \"lattice\" or \"nozzle\"";
+        return Err(Invalid::new("source", "there is no source, so there are no grains", remedy));
+    }
+    let mut total = 0_u64;
+    for (i, source) in scene.source.iter().enumerate() {
+        let (name, count) = match source {
+            Source::Block(block) => ("count", block.count),
+            Source::Lattice(lattice) => {
+                let places = if lattice.arrangement == Arrangement::FaceCentred { 4 } else { 1 };
+                let [x, y, z] = lattice.cells.map(u64::from);
+                (
+                    "cells",
+                    x.saturating_mul(if scene.domain.planar { 1 } else { y }).saturating_mul(z).saturating_mul(places),
+                )
+            }
+            Source::File(_) | Source::Nozzle(_) => continue,
+        };
+        total = total.saturating_add(count);
+        if total > GRAINS_MAX {
+            let what = format!("{total} grains are more than fit into memory");
+            return Err(Invalid::new(format!("source[{i}].{name}"), what, format!("use at most {GRAINS_MAX} in all")));
+        }
+    }
+    Ok(())
+}
+
+/// In a planar scene nothing points out of the plane y = 0, and spins point nowhere else.
+fn planar(scene: &Scene) -> Checked {
+    for (i, source) in scene.source.iter().enumerate() {
+        let key = |name: &str| format!("source[{i}].{name}");
+        let (velocity, spin) = match source {
+            Source::File(_) => continue,
+            Source::Block(block) => (block.velocity, block.spin),
+            Source::Lattice(lattice) => (lattice.velocity, lattice.spin),
+            Source::Nozzle(nozzle) => {
+                in_plane(&key("centre"), nozzle.centre)?;
+                in_plane(&key("axis"), nozzle.axis)?;
+                ([0.0; 3], nozzle.spin)
+            }
+        };
+        in_plane(&key("velocity"), velocity)?;
+        if spin[0] != 0.0 || spin[2] != 0.0 {
+            let what = format!("{spin:?} turns out of the plane y = 0");
+            return Err(Invalid::new(key("spin"), what, "in a planar scene grains spin about y only: [0, w, 0]"));
+        }
+    }
+    for (i, surface) in scene.surface.iter().enumerate() {
+        let key = |name: &str| format!("surface[{i}].{name}");
+        let (normal, velocity) = match surface {
+            Surface::Plane(plane) => (plane.normal, plane.velocity),
+            Surface::Disc(disc) => (disc.normal, disc.velocity),
+            Surface::Rectangle(rectangle) => (rectangle.normal, rectangle.velocity),
+            Surface::Mesh(mesh) => ([0.0; 3], mesh.velocity),
+            Surface::Sine(sine) => ([0.0; 3], sine.velocity),
+        };
+        in_plane(&key("normal"), normal)?;
+        in_plane(&key("velocity"), velocity)?;
+    }
+    Ok(())
+}
+
+fn in_plane(key: &str, vector: Vec3) -> Checked {
+    if vector[1] == 0.0 {
+        return Ok(());
+    }
+    let what = format!("{vector:?} points out of the plane y = 0");
+    Err(Invalid::new(key, what, "the scene is planar: set the second number to 0, or `domain.planar = false`"))
+}
+
+fn positive(key: &str, value: f64, unit: &str) -> Checked {
+    if value > 0.0 {
+        return Ok(());
+    }
+    Err(Invalid::new(key, format!("{value} {unit} is not above 0"), "give a number above 0"))
+}
+
+fn not_negative(key: &str, value: f64) -> Checked {
+    if value >= 0.0 {
+        return Ok(());
+    }
+    Err(Invalid::new(key, format!("{value} is below 0"), "friction is 0 (smooth) or more"))
+}

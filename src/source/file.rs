@@ -1,0 +1,164 @@
+//! Grains from a CSV table.
+//!
+//! The header names the columns, in any order: `x,y,z,vx,vy,vz` and, optionally, `wx,wy,wz,radius,density`. A column `id`
+//! is passed over, so that the `grains.csv` of one run can be the source of another. Lines that start with `#` are
+//! comments.
+
+use std::fs::File;
+use std::path::Path;
+
+use csv::{ErrorKind, ReaderBuilder, StringRecord, Trim};
+use nalgebra::Vector3;
+use rand_pcg::Pcg64Mcg;
+
+use super::context::Context;
+use super::radius::Radii;
+use crate::grains::NewGrain;
+use crate::scene::{FileSource, Invalid};
+
+/// All columns; the first `NEEDED` must be there.
+const COLUMNS: [&str; 11] = ["x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz", "radius", "density"];
+const NEEDED: usize = 6;
+const RADIUS: usize = 9;
+const DENSITY: usize = 10;
+
+/// Columns that must be 0 in a planar scene: y, vy, wx and wz.
+const ZERO_IN_PLANE: [usize; 4] = [1, 4, 6, 8];
+
+/// Reads the table of `source`, whose path starts from `folder`.
+pub(super) fn read(source: &FileSource, folder: &Path, context: &Context<'_>) -> Result<Vec<NewGrain>, Invalid> {
+    let path = folder.join(&source.path);
+    let table = Table { path: path.display().to_string(), key: context.key("path"), planar: context.planar() };
+    let file = File::open(&path).map_err(|error| {
+        table.invalid(
+            format!("cannot be read: {error}"),
+            "correct the path; it starts from the folder of the scene file",
+        )
+    })?;
+    let mut reader = ReaderBuilder::new().trim(Trim::All).comment(Some(b'#')).from_reader(file);
+    let columns = table.columns(reader.headers().map_err(|error| table.unreadable(&error))?)?;
+
+    let mut fallback = Fallback { rng: context.rng(), radii: None, density: None };
+    if columns[RADIUS].is_none() {
+        fallback.radii = Some(context.radii(source.radius.as_ref())?);
+    }
+    if columns[DENSITY].is_none() {
+        fallback.density = Some(context.density(source.density)?);
+    }
+    let mut grains = Vec::new();
+    for record in reader.into_records() {
+        let record = record.map_err(|error| table.unreadable(&error))?;
+        grains.push(table.grain(&record, &columns, &mut fallback)?);
+    }
+    if grains.is_empty() {
+        return Err(table.invalid("has no rows", "add a row for each grain below the header"));
+    }
+    context.check_count("path", grains.len() as u128)?;
+    Ok(grains)
+}
+
+/// Where each of `COLUMNS` stands in the table, if it does.
+type Columns = [Option<usize>; COLUMNS.len()];
+
+/// What a grain gets where the table has no such column.
+struct Fallback {
+    rng: Pcg64Mcg,
+    radii: Option<Radii>,
+    density: Option<f64>,
+}
+
+/// What messages say about the table.
+struct Table {
+    path: String,
+    key: String,
+    planar: bool,
+}
+
+impl Table {
+    fn columns(&self, header: &StringRecord) -> Result<Columns, Invalid> {
+        let mut columns = Columns::default();
+        for (place, name) in header.iter().map(|name| name.trim_start_matches('\u{feff}')).enumerate() {
+            match COLUMNS.iter().position(|column| *column == name) {
+                Some(column) if columns[column].is_none() => columns[column] = Some(place),
+                Some(_) => return Err(self.invalid(format!("has the column `{name}` twice"), "remove one of them")),
+                None if name == "id" => {}
+                None => {
+                    let nearest = COLUMNS.into_iter().min_by_key(|column| strsim::damerau_levenshtein(column, name));
+                    return Err(self.invalid(
+                        format!(
+                            "has a column `{name}` that means nothing; the nearest name is `{}`",
+                            nearest.unwrap_or("x")
+                        ),
+                        format!("take it out or rename it; the columns are {}", COLUMNS.join(",")),
+                    ));
+                }
+            }
+        }
+        let missing: Vec<&str> =
+            (0..NEEDED).filter(|&column| columns[column].is_none()).map(|column| COLUMNS[column]).collect();
+        if missing.is_empty() {
+            Ok(columns)
+        } else {
+            Err(self.invalid(
+                format!("lacks the columns {}", missing.join(",")),
+                format!("let the first line name the columns {}", COLUMNS[..NEEDED].join(",")),
+            ))
+        }
+    }
+
+    fn grain(&self, record: &StringRecord, columns: &Columns, fallback: &mut Fallback) -> Result<NewGrain, Invalid> {
+        let value =
+            |column: usize| columns[column].map(|place| self.number(record, column, &record[place])).transpose();
+        let vector = |first: usize| -> Result<Vector3<f64>, Invalid> {
+            let [x, y, z] = [value(first)?, value(first + 1)?, value(first + 2)?];
+            Ok(Vector3::new(x.unwrap_or(0.0), y.unwrap_or(0.0), z.unwrap_or(0.0)))
+        };
+        let drawn = fallback.radii.as_ref().map(|radii| radii.draw(&mut fallback.rng));
+        Ok(NewGrain {
+            position: vector(0)?,
+            velocity: vector(3)?,
+            spin: vector(6)?,
+            radius: value(RADIUS)?.or(drawn).expect("the radius has a column or a fallback"),
+            density: value(DENSITY)?.or(fallback.density).expect("the density has a column or a fallback"),
+        })
+    }
+
+    fn number(&self, record: &StringRecord, column: usize, text: &str) -> Result<f64, Invalid> {
+        let refuse = |what: &str, remedy: &str| {
+            let line = record.position().map_or(0, csv::Position::line);
+            let shown: String = text.chars().take(40).collect();
+            Err(self.invalid(format!("line {line}, column `{}`: `{shown}` {what}", COLUMNS[column]), remedy))
+        };
+        match text.parse::<f64>() {
+            Err(_) => refuse("is not a number", "write a number such as 0.25 or -1.5e-3"),
+            Ok(value) if !value.is_finite() => refuse("is not finite", "give a finite number"),
+            Ok(value) if column >= RADIUS && value <= 0.0 => {
+                refuse("is not larger than 0", "give a number larger than 0")
+            }
+            Ok(value) if self.planar && ZERO_IN_PLANE.contains(&column) && value != 0.0 => refuse(
+                "is not 0, but the scene is planar",
+                "set it to 0, or `planar = false`: grains of a planar scene stay in the plane y = 0",
+            ),
+            // A planar scene has y = 0 exactly, and not -0.
+            Ok(value) => Ok(value + 0.0),
+        }
+    }
+
+    fn unreadable(&self, error: &csv::Error) -> Invalid {
+        let line = error.position().map_or_else(String::new, |position| format!("line {}: ", position.line()));
+        match error.kind() {
+            ErrorKind::UnequalLengths { expected_len, len, .. } => self.invalid(
+                format!("{line}{len} values, but the header has {expected_len} columns"),
+                "give every row one value for each column",
+            ),
+            ErrorKind::Utf8 { .. } => {
+                self.invalid(format!("{line}not text in UTF-8"), "save the table as plain text in UTF-8")
+            }
+            _ => self.invalid(format!("{line}cannot be read: {error}"), "check that it is a CSV table"),
+        }
+    }
+
+    fn invalid(&self, what: impl AsRef<str>, remedy: impl Into<String>) -> Invalid {
+        Invalid::new(&self.key, format!("{}: {}", self.path, what.as_ref()), remedy)
+    }
+}

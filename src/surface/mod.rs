@@ -1,0 +1,307 @@
+//! What grains hit: planes, meshes from files, and generated meshes.
+
+use std::path::Path;
+
+use impinge_events::contact_time::{APPROACH_ROUNDING, Sweep, sphere_plane};
+use impinge_events::{Flight, Outlook, SurfaceContact};
+use nalgebra::Vector3;
+
+use crate::scene::{self, Invalid, Vec3};
+use index::Index;
+pub use mesh::Report;
+
+mod generated;
+mod index;
+mod mesh;
+
+/// Three corners, m.
+pub type Triangle = [Vector3<f64>; 3];
+
+/// All surfaces of a scene.
+///
+/// Elements (a plane, a triangle) are numbered from 0 over all surfaces in the order of the scene. Each surface moves at its own
+/// constant velocity or rests; a contact with a moving one is predicted in the frame that moves along.
+///
+/// ```
+/// use impinge::scene;
+/// use impinge::surface::Surface;
+/// use impinge_events::{Flight, Outlook, Surface as _};
+/// use nalgebra::Vector3;
+///
+/// let floor = scene::PlaneSurface { point: [0.0; 3], normal: [0.0, 0.0, 2.0], velocity: [0.0; 3] };
+/// let surface = Surface::new(&[scene::Surface::Plane(floor)], std::path::Path::new(".")).unwrap();
+/// let grain = Flight { position: Vector3::new(0.0, 0.0, 1.5), time: 0.0, velocity: -Vector3::z(), radius: 0.5 };
+/// assert_eq!(surface.first_contact(&grain, 10.0), Outlook::Hit { time: 1.0, element: 0 });
+/// ```
+#[derive(Clone, Debug)]
+pub struct Surface {
+    parts: Vec<Part>,
+    elements: u32,
+}
+
+/// One surface of the scene.
+#[derive(Clone, Debug)]
+struct Part {
+    first_element: u32,
+    /// m/s
+    velocity: Vector3<f64>,
+    moves: bool,
+    /// How far it has moved by the start of the epoch, m.
+    offset: Vector3<f64>,
+    shape: Shape,
+}
+
+#[derive(Clone, Debug)]
+enum Shape {
+    Plane { point: Vector3<f64>, normal: Vector3<f64> },
+    // Boxed, so that a scene of planes stays in a cache line or two.
+    Mesh(Box<(Index, Report)>),
+}
+
+impl Surface {
+    /// Makes the surfaces of a scene; paths are relative to `folder`.
+    ///
+    /// # Errors
+    /// A mesh that cannot be used, a direction without length, a size that is none; `key` says where in the scene.
+    pub fn new(surfaces: &[scene::Surface], folder: &Path) -> Result<Self, Invalid> {
+        let mut made = Self { parts: Vec::with_capacity(surfaces.len()), elements: 0 };
+        for (number, surface) in surfaces.iter().enumerate() {
+            let key = format!("surface[{number}]");
+            let (shape, velocity) = shape(surface, folder, &key)?;
+            let velocity = finite(velocity, &format!("{key}.velocity"))?;
+            let moves = velocity != Vector3::zeros();
+            let first_element = made.elements;
+            made.elements = first_element
+                .checked_add(shape.elements())
+                .ok_or_else(|| Invalid::new(&key, "more triangles than can be numbered", "Use a coarser mesh."))?;
+            made.parts.push(Part { first_element, velocity, moves, offset: Vector3::zeros(), shape });
+        }
+        Ok(made)
+    }
+
+    /// How many planes and triangles there are.
+    #[must_use]
+    pub fn elements(&self) -> u32 {
+        self.elements
+    }
+
+    /// All triangles with their numbers, where they are at the start of the epoch.
+    pub fn triangles(&self) -> impl Iterator<Item = (u32, Triangle)> + '_ {
+        self.parts.iter().flat_map(|part| {
+            let mesh = part.mesh();
+            (0..mesh.map_or(0, |index| index.mesh().len())).filter_map(move |number| {
+                let corners = mesh?.mesh().triangle(number);
+                Some((part.first_element + number as u32, corners.map(|corner| corner + part.offset)))
+            })
+        })
+    }
+
+    /// All planes: number, a point where it is at the start of the epoch (m), unit normal.
+    pub fn planes(&self) -> impl Iterator<Item = (u32, Vector3<f64>, Vector3<f64>)> + '_ {
+        self.parts.iter().filter_map(|part| match part.shape {
+            Shape::Plane { point, normal } => Some((part.first_element, point + part.offset, normal)),
+            Shape::Mesh(_) => None,
+        })
+    }
+
+    /// What the import of each mesh found and mended, with the number of its `[[surface]]`, counted from 0.
+    pub fn reports(&self) -> impl Iterator<Item = (usize, &Report)> {
+        self.parts.iter().enumerate().filter_map(|(number, part)| match &part.shape {
+            Shape::Plane { .. } => None,
+            Shape::Mesh(mesh) => Some((number, &mesh.1)),
+        })
+    }
+
+    /// Whether a grain at rest at `position` (m) is inside a surface at the start of the epoch: it reaches below a plane, cuts a
+    /// triangle, or has its centre inside a watertight mesh, which is taken for solid (a vessel needs an opening, or walls with an
+    /// inside and an outside). Says into which element it reaches the deepest, and how deep (m).
+    #[must_use]
+    pub fn overlaps(&self, position: Vector3<f64>, radius: f64) -> Option<(u32, f64)> {
+        let overlaps = self.parts.iter().filter_map(|part| part.overlap(position - part.offset, radius));
+        overlaps.reduce(|deepest, other| if other.1 > deepest.1 { other } else { deepest })
+    }
+
+    /// The surface to which `element` belongs.
+    fn part(&self, element: u32) -> &Part {
+        let next = self.parts.partition_point(|part| part.first_element <= element);
+        &self.parts[next - 1]
+    }
+}
+
+impl impinge_events::Surface for Surface {
+    #[inline]
+    fn first_contact(&self, flight: &Flight, until: f64) -> Outlook {
+        let mut clear = f64::INFINITY;
+        let mut hit: Option<(f64, u32)> = None;
+        for part in &self.parts {
+            let end = hit.map_or(until, |(time, _)| time.min(until));
+            match part.first_contact(flight, end) {
+                // Parts come in the order of their elements, so of equal times the lowest element wins.
+                Outlook::Hit { time, element } if hit.is_none_or(|(first, _)| time < first) => {
+                    hit = Some((time, element));
+                }
+                Outlook::Hit { .. } => {}
+                Outlook::ClearUntil(time) => clear = clear.min(time),
+            }
+        }
+        match hit {
+            Some((time, element)) if time <= clear => Outlook::Hit { time, element },
+            _ => Outlook::ClearUntil(clear),
+        }
+    }
+
+    fn contact(&self, element: u32, flight: &Flight) -> SurfaceContact {
+        let part = self.part(element);
+        let (normal, gap) = match &part.shape {
+            Shape::Plane { point, normal } => {
+                let height = (part.seen(flight).position - point).dot(normal);
+                (*normal, height - flight.radius)
+            }
+            Shape::Mesh(mesh) => {
+                mesh.0.mesh().normal_and_gap((element - part.first_element) as usize, &part.sweep(flight))
+            }
+        };
+        SurfaceContact { normal, gap, velocity: part.velocity }
+    }
+
+    fn speed(&self) -> f64 {
+        self.parts.iter().map(|part| part.velocity.amax()).fold(0.0, f64::max)
+    }
+
+    fn start_epoch(&mut self, duration: f64) {
+        for part in &mut self.parts {
+            part.offset += part.velocity * duration;
+        }
+    }
+}
+
+impl Part {
+    #[inline]
+    fn first_contact(&self, flight: &Flight, until: f64) -> Outlook {
+        match &self.shape {
+            Shape::Plane { point, normal } => match self.plane_contact(flight, point, normal) {
+                Some(time) => Outlook::Hit { time, element: self.first_element },
+                None => Outlook::ClearUntil(f64::INFINITY),
+            },
+            Shape::Mesh(mesh) => match mesh.0.first_contact(&self.sweep(flight), until) {
+                Outlook::Hit { time, element } => Outlook::Hit { time, element: self.first_element + element },
+                clear @ Outlook::ClearUntil(_) => clear,
+            },
+        }
+    }
+
+    #[inline]
+    fn plane_contact(&self, flight: &Flight, point: &Vector3<f64>, normal: &Vector3<f64>) -> Option<f64> {
+        if !self.moves {
+            return sphere_plane(flight, *point, *normal);
+        }
+        let seen = self.seen(flight);
+        let approach = -seen.velocity.dot(normal);
+        if approach > APPROACH_ROUNDING * self.speeds(flight) { sphere_plane(&seen, *point, *normal) } else { None }
+    }
+
+    /// The flight as seen from this surface, in the coordinates in which it was made.
+    #[inline]
+    fn seen(&self, flight: &Flight) -> Flight {
+        if !self.moves {
+            return *flight;
+        }
+        let displacement = self.offset + self.velocity * flight.time;
+        Flight { position: flight.position - displacement, velocity: flight.velocity - self.velocity, ..*flight }
+    }
+
+    /// The size of the speeds whose difference a relative velocity is, m/s.
+    #[inline]
+    fn speeds(&self, flight: &Flight) -> f64 {
+        flight.velocity.amax() + self.velocity.amax()
+    }
+
+    #[inline]
+    fn sweep(&self, flight: &Flight) -> Sweep {
+        Sweep::new(&self.seen(flight), self.speeds(flight))
+    }
+
+    fn mesh(&self) -> Option<&Index> {
+        match &self.shape {
+            Shape::Plane { .. } => None,
+            Shape::Mesh(mesh) => Some(&mesh.0),
+        }
+    }
+
+    /// How deep a grain is inside this surface, and in which element; `position` in the coordinates in which it was made.
+    fn overlap(&self, position: Vector3<f64>, radius: f64) -> Option<(u32, f64)> {
+        match &self.shape {
+            Shape::Plane { point, normal } => {
+                let depth = radius - (position - point).dot(normal);
+                (depth > 0.0).then_some((self.first_element, depth))
+            }
+            Shape::Mesh(mesh) => {
+                let index = &mesh.0;
+                if index.encloses(&position) {
+                    let (element, distance) = index.nearest(&position, f64::INFINITY)?;
+                    return Some((self.first_element + element, distance + radius));
+                }
+                let (element, distance) = index.nearest(&position, radius)?;
+                (distance < radius).then_some((self.first_element + element, radius - distance))
+            }
+        }
+    }
+}
+
+impl Shape {
+    fn elements(&self) -> u32 {
+        match self {
+            Self::Plane { .. } => 1,
+            Self::Mesh(mesh) => mesh.0.mesh().len() as u32,
+        }
+    }
+
+    fn mesh(triangles: &[Triangle], key: &str) -> Result<Self, Invalid> {
+        let (mesh, report) = mesh::mend(triangles, key)?;
+        Ok(Self::Mesh(Box::new((Index::new(mesh), report))))
+    }
+}
+
+/// The shape and the velocity of one `[[surface]]`.
+fn shape(surface: &scene::Surface, folder: &Path, key: &str) -> Result<(Shape, Vec3), Invalid> {
+    Ok(match surface {
+        scene::Surface::Plane(plane) => {
+            let point = finite(plane.point, &format!("{key}.point"))?;
+            let normal = unit(plane.normal, &format!("{key}.normal"))?;
+            (Shape::Plane { point, normal }, plane.velocity)
+        }
+        scene::Surface::Mesh(file) => {
+            let path_key = format!("{key}.path");
+            let offset = finite(file.offset, &format!("{key}.offset"))?;
+            if !(file.scale.is_finite() && file.scale != 0.0) {
+                let what = format!("{} is not a scale", file.scale);
+                return Err(Invalid::new(format!("{key}.scale"), what, "Give the metres per unit of the file."));
+            }
+            let mut triangles = mesh::read(&folder.join(&file.path), &path_key)?;
+            triangles.iter_mut().flatten().for_each(|corner| *corner = *corner * file.scale + offset);
+            let named = |bad: Invalid| Invalid { what: format!("{}: {}", file.path, bad.what), ..bad };
+            (Shape::mesh(&triangles, &path_key).map_err(named)?, file.velocity)
+        }
+        scene::Surface::Disc(disc) => (Shape::mesh(&generated::disc(disc, key)?, key)?, disc.velocity),
+        scene::Surface::Rectangle(rectangle) => {
+            (Shape::mesh(&generated::rectangle(rectangle, key)?, key)?, rectangle.velocity)
+        }
+        scene::Surface::Sine(sine) => (Shape::mesh(&generated::sine(sine, key)?, key)?, sine.velocity),
+    })
+}
+
+fn finite(vector: Vec3, key: &str) -> Result<Vector3<f64>, Invalid> {
+    if vector.iter().all(|x| x.is_finite()) {
+        return Ok(vector.into());
+    }
+    Err(Invalid::new(key, format!("{vector:?} is not finite"), "Give three finite numbers."))
+}
+
+fn unit(vector: Vec3, key: &str) -> Result<Vector3<f64>, Invalid> {
+    let direction = finite(vector, key)?;
+    if direction == Vector3::zeros() {
+        return Err(Invalid::new(key, format!("{vector:?} has no direction"), "Give any vector but 0."));
+    }
+    // In units of its largest component nothing overflows or underflows.
+    Ok((direction / direction.amax()).normalize())
+}
