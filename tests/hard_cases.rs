@@ -220,7 +220,7 @@ impl Observer for Overlaps {
 
 /// Runs a dense gas for about `events` collisions and gives the largest overlap of both halves.
 fn overlaps_in_a_gas(events: u64) -> [f64; 2] {
-    let (grains, domain) = gas(4, 0.45, 12);
+    let (grains, domain) = gas(6, 0.45, 12);
     let mut scheme: EventDriven<_> = EventDriven::new(&grains, NoSurface, domain, smooth(1.0, 1.0), 0.0);
     let mut overlaps = Overlaps { largest: [0.0; 2], seen: 0, of: events };
     while overlaps.seen < events {
@@ -247,11 +247,11 @@ fn case_12_overlaps_do_not_grow_in_a_billion_events() {
 /// Hard case 14: what is resolved at t = 0 is resolved at t = 1e9 s, bit for bit.
 #[test]
 fn case_14_a_gas_at_1e9_s_does_what_it_does_at_0() {
-    let (grains, domain) = gas(4, 0.3, 14);
+    let (grains, domain) = gas(6, 0.3, 14);
     let events = |start: f64| {
         let mut scheme: EventDriven<_> = EventDriven::new(&grains, NoSurface, domain, smooth(0.95, 0.95), start);
         let mut log = Log::default();
-        run(&mut scheme, start + 20.0, &mut log).expect("no broken invariant");
+        run(&mut scheme, start + 25.0, &mut log).expect("no broken invariant");
         log.0
     };
     let (early, late) = (events(0.0), events(1e9));
