@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::APPROACH_ROUNDING;
+use super::{APPROACH_ROUNDING, STANDSTILL};
 use crate::Flight;
 
 /// Time (s, epoch time) at which the spheres `a` and `b` touch, or `None` when they never do.
@@ -89,7 +89,10 @@ fn meeting(a: &Flight, b: &Flight, r: Vector3<f64>, v: Vector3<f64>, approach: f
 #[cold]
 fn slow_meeting(a: &Flight, b: &Flight, r: Vector3<f64>, v: Vector3<f64>) -> Option<f64> {
     let fastest = a.velocity.amax().max(b.velocity.amax());
-    let unit = 2f64.powi(fastest.log2().floor().clamp(-960.0, 0.0) as i32);
+    if fastest < STANDSTILL {
+        return None;
+    }
+    let unit = 2f64.powi(fastest.log2().floor().min(0.0) as i32);
     let scaled = |flight: &Flight| Flight { velocity: flight.velocity / unit, ..*flight };
     let v = v / unit;
     meeting(&scaled(a), &scaled(b), r, v, -r.dot(&v), v.norm_squared()).map(|interval| interval / unit)
