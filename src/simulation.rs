@@ -46,6 +46,7 @@ pub struct Outcome {
 #[derive(Clone, Debug)]
 pub struct Simulation {
     scheme: EventDriven<Surface>,
+    counts: Vec<usize>,
     nozzles: Vec<Nozzle>,
     samples: Moments,
     frames: Moments,
@@ -59,20 +60,19 @@ impl Simulation {
     /// A value of the scene that cannot be used, by its key.
     pub fn new(scene: &Scene, folder: &Path) -> Result<Self, Invalid> {
         let surface = Surface::new(&scene.surface, folder)?;
-        let placed =
-            source::place(scene, folder, &|centre, radius| surface.overlaps(centre, radius).map(|(_, depth)| depth))?;
-        let domain = domain(scene);
-        let largest = placed.grains.iter().map(|grain| grain.radius).fold(0.0, f64::max);
-        if !domain.holds(largest) {
-            let what = format!(
-                "a periodic domain must be at least eight grain radii wide, and the largest grain has {largest} m"
-            );
-            return Err(Invalid::new("domain.max", what, "widen the domain or make the grains smaller"));
+        if scene.domain.planar {
+            surface.check_planar()?;
         }
-        let scheme = EventDriven::new(&placed.grains, surface, domain, laws(scene)?, scene.run.start);
+        let overlap = |centre, radius| {
+            let (element, depth) = surface.overlaps(centre, radius)?;
+            Some((surface.number_of(element), depth))
+        };
+        let placed = source::place(scene, folder, &overlap)?;
+        let scheme = EventDriven::new(&placed.grains, surface, domain(scene), laws(scene)?, scene.run.start);
         let moments = |count| Moments::new(scene.run.start, scene.run.until, count);
         Ok(Self {
             scheme,
+            counts: placed.counts,
             nozzles: placed.nozzles,
             samples: moments(scene.output.samples.max(2)),
             frames: moments(scene.run.frames),
@@ -114,6 +114,12 @@ impl Simulation {
                 Stop::End => return Ok(Outcome { time, interrupted: false }),
             }
         }
+    }
+
+    /// How many grains each source has placed at the start; 0 for a nozzle.
+    #[must_use]
+    pub fn counts(&self) -> &[usize] {
+        &self.counts
     }
 
     /// The nozzles, with what they have sent and deferred so far.

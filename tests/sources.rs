@@ -310,8 +310,8 @@ fn lattices_fill_their_box_evenly() {
 fn a_lattice_of_touching_grains_is_allowed_and_a_tighter_one_is_not() {
     for (arrangement, largest) in [("cubic", 0.05), ("face-centred", 0.1 / 8f64.sqrt())] {
         let with =
-            |radius: f64| lattice([3, 3, 3], [0.3; 3], &format!("arrangement = \"{arrangement}\"\nradius = {radius}"));
-        for domain in [ROOM, "min = [0.0, 0.0, 0.0], max = [0.3, 0.3, 0.3], boundary = \"periodic\""] {
+            |radius: f64| lattice([5, 5, 5], [0.5; 3], &format!("arrangement = \"{arrangement}\"\nradius = {radius}"));
+        for domain in [ROOM, "min = [0.0, 0.0, 0.0], max = [0.5, 0.5, 0.5], boundary = \"periodic\""] {
             assert!(!grains(domain, &with(largest)).is_empty());
             let refused = refusal(domain, &with(largest + 1e-6));
             assert!(refused.what.contains("overlap by 2.000e-6 m"), "{}", refused.what);
@@ -355,14 +355,15 @@ fn bad_tables_are_refused_with_line_column_and_value() {
         (ROOM, "x,y,z,vx,vz\n1,2,3,4,5\n", "lacks the columns vy"),
         (ROOM, "x,y,z,vx,vy,vz,raduis\n1,2,3,4,5,6,7\n", "`raduis` that means nothing; the nearest name is `radius`"),
         (ROOM, "x,y,z,vx,vy,vz,x\n1,2,3,4,5,6,7\n", "has the column `x` twice"),
-        (ROOM, "x,y,z,vx,vy,vz\n0,0,0,0,0,0\n1,2,3,4,5,six\n", "line 3, column `vz`: `six` is not a number"),
-        (ROOM, "x,y,z,vx,vy,vz\n0,0,NaN,0,0,0\n", "line 2, column `z`: `NaN` is not finite"),
-        (ROOM, "x,y,z,vx,vy,vz\n0,0,1e999,0,0,0\n", "line 2, column `z`: `1e999` is not finite"),
-        (ROOM, "x,y,z,vx,vy,vz,radius\n0,0,0,0,0,0,-0.1\n", "line 2, column `radius`: `-0.1` is not larger than 0"),
-        (ROOM, "x,y,z,vx,vy,vz,density\n0,0,0,0,0,0,0\n", "line 2, column `density`: `0` is not larger than 0"),
+        (ROOM, "x,y,z,vx,vy,vz\n0,0,0,0,0,0\n1,2,3,4,5,six\n", "line 3: column `vz`: `six` is not a number"),
+        (ROOM, "x,y,z,vx,vy,vz\n0,0,NaN,0,0,0\n", "line 2: column `z`: `NaN` is not finite"),
+        (ROOM, "x,y,z,vx,vy,vz\n0,0,1e999,0,0,0\n", "line 2: column `z`: `1e999` is not finite"),
+        (ROOM, "x,y,z,vx,vy,vz,radius\n0,0,0,0,0,0,-0.1\n", "line 2: column `radius`: `-0.1` is not larger than 0"),
+        (ROOM, "x,y,z,vx,vy,vz,density\n0,0,0,0,0,0,0\n", "line 2: column `density`: `0` is not larger than 0"),
+        (ROOM, "# mm\nx,y,z,vx,vy,vz\n\n0,0,0,0,0,0\n\r\n# last\n1,2,3,4,5,six", "line 7: column `vz`: `six` is not a"),
         (ROOM, "x,y,z,vx,vy,vz\n0,0,0,0,0\n", "line 2: 5 values, but the header has 6 columns"),
-        (planar, "x,y,z,vx,vy,vz\n0,0.1,0,0,0,0\n", "line 2, column `y`: `0.1` is not 0, but the scene is planar"),
-        (planar, "x,y,z,vx,vy,vz\n0,0,0,0,-1,0\n", "line 2, column `vy`: `-1` is not 0, but the scene is planar"),
+        (planar, "x,y,z,vx,vy,vz\n0,0.1,0,0,0,0\n", "line 2: column `y`: `0.1` is not 0, but the scene is planar"),
+        (planar, "x,y,z,vx,vy,vz\n0,0,0,0,-1,0\n", "line 2: column `vy`: `-1` is not 0, but the scene is planar"),
     ] {
         let refused = from_table(domain, text).unwrap_err();
         assert_eq!(refused.key, "source[0].path");
@@ -391,15 +392,15 @@ fn newtons_cradle_touches_and_is_accepted() {
 #[test]
 fn overlapping_grains_are_named_with_their_depth() {
     let refused = from_table(ROOM, &table(&[[0.0; 3], [1.0; 3], [1.0, 1.0, 1.019]])).unwrap_err();
-    assert_eq!(refused.key, "source[0]");
-    let expected = "grain 2 (of source[0]) and grain 1 (of source[0]) overlap by 1.000e-3 m";
+    assert_eq!(refused.key, "source[0].path");
+    let expected = "grain 1 (grains.csv, line 3) and grain 2 (grains.csv, line 4) overlap by 1.000e-3 m";
     assert!(refused.what.contains(expected), "{}", refused.what);
 
     let across = block(10, [0.0; 3], [0.1; 3], "") + &lattice([5, 5, 5], [0.1; 3], "");
     let refused = refusal(ROOM, &across);
     assert_eq!(refused.key, "source[1]");
     assert!(
-        refused.what.contains("(of source[1]) and grain") && refused.what.contains("(of source[0])"),
+        refused.what.contains(" of source[0] and grain ") && refused.what.contains(" of source[1] overlap by "),
         "{}",
         refused.what
     );
@@ -408,25 +409,48 @@ fn overlapping_grains_are_named_with_their_depth() {
 
 #[test]
 fn overlaps_with_periodic_images_are_found() {
-    let periodic = "min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 0.03], boundary = \"periodic\"";
+    let periodic = "min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 0.09], boundary = \"periodic\"";
     let rows = [[0.001, 0.5, 0.01], [0.99, 0.5, 0.01]];
     assert!(from_table(periodic, &table(&rows)).unwrap_err().what.contains("overlap by 9.000e-3 m"));
-    assert!(from_table("min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 0.03]", &table(&rows)).is_ok());
-    let flat = "min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 0.015], boundary = \"periodic\"";
-    let refused = from_table(flat, &table(&[[0.5, 0.5, 0.01]])).unwrap_err();
-    assert!(refused.what.contains("overlaps its own periodic image by 5.000e-3 m"), "{}", refused.what);
+    assert!(from_table("min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 0.09]", &table(&rows)).is_ok());
+}
+
+/// The largest radius counts, of whatever source and however it came about.
+#[test]
+fn a_periodic_domain_is_eight_radii_wide() {
+    let domain = |side: f64| format!("min = [0.0, 0.0, 0.0], max = [1.0, 1.0, {side}], boundary = \"periodic\"");
+    let radius =
+        |radius: f64| format!("x,y,z,vx,vy,vz,radius\n0.2,0.2,0.01,0,0,0,0.001\n0.5,0.5,0.05,0,0,0,{radius}\n");
+    assert!(from_table(&domain(0.0801), &radius(0.01)).is_ok());
+    let nozzle = |radius: &str| {
+        format!(
+            "[[source]]\nkind = \"nozzle\"\nshape = {{ circle = {{ diameter = 0.04 }} }}\ncentre = [0.5, 0.5, 0.04]\n\
+             axis = [1, 0, 0]\nspeed = 1.0\nflow = {{ number_flux = 1.0 }}\nradius = {radius}\n"
+        )
+    };
+    let drawn = "{ mean = 0.01, cv = 0.1, distribution = \"uniform\" }";
+    for refused in [
+        from_table(&domain(0.0799), &radius(0.01)).unwrap_err(),
+        refusal(&domain(0.0801), &nozzle(drawn)),
+        refusal(&domain(0.0801), &block(1, [0.0; 3], [0.05; 3], &format!("radius = {drawn}"))),
+    ] {
+        assert_eq!(refused.key, "domain.max[2]");
+        assert!(refused.what.contains("too narrow for grains of radius"), "{}", refused.what);
+    }
+    assert_eq!(refusal(&domain(0.5), &nozzle(&drawn.replace("uniform", "lognormal"))).key, "source[0].radius");
 }
 
 #[test]
 fn grains_outside_the_domain_or_in_the_surface_are_refused() {
     let refused =
         from_table("min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0]", &table(&[[0.5; 3], [0.5, 0.5, 1.5]])).unwrap_err();
-    assert!(refused.what.contains("grain 1 at (0.5, 0.5, 1.5), radius 0.01, has its centre outside the domain"));
-    let plane = |position: Vector3<f64>, radius: f64| (position.z < radius).then_some(radius - position.z);
+    let expected = "grain 1 (grains.csv, line 3) at (0.5, 0.5, 1.5), radius 0.01 m, has its centre outside the domain";
+    assert!(refused.what.contains(expected), "{}", refused.what);
+    let plane = |position: Vector3<f64>, radius: f64| (position.z < radius).then_some((3, radius - position.z));
     let at = |z: f64| place(&scene(ROOM, &block(1, [0.0, 0.0, z], [0.0, 0.0, z], "")), Path::new("."), &plane);
     assert!(at(0.01 - 1e-16).is_ok(), "a grain that rests on the surface touches it");
     let refused = at(0.008).unwrap_err();
-    assert!(refused.what.contains("overlaps the surface by 2.000e-3 m"), "{}", refused.what);
+    assert!(refused.what.contains("overlaps surface[3] by 2.000e-3 m"), "{}", refused.what);
 }
 
 #[test]

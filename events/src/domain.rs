@@ -80,8 +80,7 @@ impl Domain {
         apart
     }
 
-    /// Whether grains of this radius (m) fit: a periodic domain must be at least eight radii wide, or the image that a grain meets
-    /// would not be clear.
+    /// Whether grains of this radius (m) fit into a periodic domain ([`least_period`](crate::least_period)).
     #[must_use]
     pub fn holds(&self, radius: f64) -> bool {
         !self.periodic || self.axes().iter().all(|&axis| self.extent()[axis] >= crate::neighbors::least_period(radius))

@@ -45,6 +45,7 @@ pub use domain::Domain;
 pub use encounters::{Encounter, Encounters};
 pub use flight::Flight;
 pub use mesh::{BadTriangle, Mesh};
+pub use neighbors::least_period;
 pub use surface::{NoSurface, Outlook, Surface, SurfaceContact};
 
 /// The program in README.md runs too.

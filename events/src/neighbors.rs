@@ -28,8 +28,10 @@ const LOOKS_PER_CROSSING: f64 = 6.0;
 const WORTH_A_NEW_LAYOUT: f64 = 0.8;
 const NOBODY: u32 = u32::MAX;
 
-/// Smallest length of a period for grains of this radius, m.
-pub(crate) fn least_period(radius: f64) -> f64 {
+/// Smallest side (m) that a periodic domain may have for grains of this radius (m): eight radii and a little, or the image that a
+/// grain meets would not be clear.
+#[must_use]
+pub fn least_period(radius: f64) -> f64 {
     f64::from(FEWEST_PERIODIC_CELLS) * contact_width(radius)
 }
 

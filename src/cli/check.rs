@@ -1,7 +1,6 @@
 //! `impinge check`
 
 use std::fmt::{self, Write};
-use std::path::Path;
 
 use impinge::scene::{Friction, Scene, SceneFile, Source, Surface};
 use impinge::simulation::Simulation;
@@ -23,12 +22,12 @@ pub(super) fn check(args: &Args) -> Result<Ending, Failure> {
     let file = args.scene.read()?;
     let simulation = Simulation::new(&file.scene, file.folder()).map_err(|invalid| file.locate(invalid))?;
     let mut text = String::new();
-    describe(&mut text, &file, simulation.surface()).expect("a string takes any text");
+    describe(&mut text, &file, &simulation).expect("a string takes any text");
     print(&text)?;
     Ok(Ending::Done)
 }
 
-fn describe(out: &mut String, file: &SceneFile, loaded: &impinge::surface::Surface) -> fmt::Result {
+fn describe(out: &mut String, file: &SceneFile, simulation: &Simulation) -> fmt::Result {
     let scene = &file.scene;
     let (run, domain) = (&scene.run, &scene.domain);
     writeln!(out, "{}: valid", file.path().display())?;
@@ -45,10 +44,10 @@ fn describe(out: &mut String, file: &SceneFile, loaded: &impinge::surface::Surfa
             writeln!(out, "contact     {name}: restitution {}, {}", contact.restitution, friction(&contact.friction))?;
         }
     }
-    sources(out, scene, file.folder())?;
+    sources(out, scene, simulation.counts())?;
     for (i, surface) in scene.surface.iter().enumerate() {
         writeln!(out, "surface[{i}]  {}", surface_in_words(surface))?;
-        for (_, report) in loaded.reports().filter(|(number, _)| *number == i) {
+        for (_, report) in simulation.surface().reports().filter(|(number, _)| *number == i) {
             for line in report.to_string().lines() {
                 writeln!(out, "            {line}")?;
             }
@@ -57,14 +56,12 @@ fn describe(out: &mut String, file: &SceneFile, loaded: &impinge::surface::Surfa
     Ok(())
 }
 
-fn sources(out: &mut String, scene: &Scene, folder: &Path) -> fmt::Result {
+fn sources(out: &mut String, scene: &Scene, placed: &[usize]) -> fmt::Result {
     let mut count = 0.0;
     let what = if scene.domain.planar { "area fraction" } else { "volume fraction" };
-    for (i, source) in scene.source.iter().enumerate() {
+    for (i, (source, &rows)) in scene.source.iter().zip(placed).enumerate() {
         let kind = match source {
             Source::File(table) => {
-                let rows =
-                    csv::Reader::from_path(folder.join(&table.path)).map_or(0, |table| table.into_records().count());
                 count += rows as f64;
                 writeln!(out, "source[{i}]   file {}: {rows} grains", table.path)?;
                 continue;
@@ -75,20 +72,29 @@ fn sources(out: &mut String, scene: &Scene, folder: &Path) -> fmt::Result {
         };
         let Some(crowd) = Crowd::of(source, scene) else { continue };
         count += crowd.count;
-        let (radius, mass) = (crowd.mean_radius(), crowd.mass());
-        writeln!(out, "source[{i}]   {kind}: {} grains, mean radius {radius} m, {mass:.4e} kg", crowd.count)?;
-        writeln!(out, "            {what} {:.4}", crowd.fraction())?;
-        writeln!(out, "            mean free path {:.3e} m (dilute gas as dense as this)", crowd.mean_free_path())?;
+        let (radius, mass) = (crowd.mean_radius(), digits(crowd.mass(), 4));
+        writeln!(out, "source[{i}]   {kind}: {} grains, mean radius {radius} m, in all {mass} kg", crowd.count)?;
+        writeln!(out, "            {what} {}", digits(crowd.fraction(), 3))?;
+        writeln!(
+            out,
+            "            mean free path {} m in a dilute gas as dense as this",
+            digits(crowd.mean_free_path(), 3)
+        )?;
         match crowd.collisions(scene) {
             Some((number, formula)) => {
-                writeln!(out, "            about {number:.1e} collisions between grains")?;
+                writeln!(out, "            about {} collisions between grains", digits(number, 2))?;
                 writeln!(out, "            ({formula})")?;
             }
             None => writeln!(out, "            collisions between grains not estimated")?,
         }
     }
-    let megabytes = count * BYTES_PER_GRAIN / 1e6;
-    writeln!(out, "in all      {count} grains, at most {megabytes:.1} MB ({BYTES_PER_GRAIN} bytes a grain)")
+    let megabytes = digits(count * BYTES_PER_GRAIN / 1e6, 2);
+    writeln!(out, "in all      {count} grains, at most {megabytes} MB ({BYTES_PER_GRAIN} bytes a grain)")
+}
+
+/// A number rounded to so many digits.
+fn digits(number: f64, count: usize) -> f64 {
+    format!("{number:.*e}", count - 1).parse().unwrap_or(number)
 }
 
 fn friction(friction: &Friction) -> String {

@@ -71,7 +71,7 @@ impl Error {
             Self::Foreign { .. } => "move it elsewhere, or name another folder with -o".into(),
             Self::NotAFolder { .. } => "name another folder with -o".into(),
             Self::Write { source, .. } => match source.kind() {
-                io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+                io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge => {
                     "free some space, or name a folder on another disk with -o; fewer `run.frames` need less".into()
                 }
                 io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {

@@ -47,6 +47,10 @@ impl Folder {
         let target = if target.exists() { target.canonicalize() } else { std::path::absolute(target) }.map_err(fail)?;
         may_replace(&target, force)?;
         let parent = target.parent().ok_or_else(|| Error::NotAFolder { path: target.clone() })?;
+        // The error of the system does not say which of the folders on the way is none.
+        if let Some(file) = parent.ancestors().find(|path| path.exists()).filter(|path| !path.is_dir()) {
+            return Err(Error::NotAFolder { path: file.to_owned() });
+        }
         fs::create_dir_all(parent).map_err(|source| Error::Write { path: parent.to_owned(), source })?;
         let staging = beside(&target, "partial").map_err(|source| Error::Write { path: target.clone(), source })?;
         Ok(Self { target, staging, force })

@@ -42,6 +42,8 @@ pub struct Recorder {
     side_view: SideView,
     events: Option<EventTable>,
     frames: Vec<(f64, String)>,
+    /// How many of them `grains.pvd` lists so far.
+    listed: usize,
     last: Last,
     error: Option<Error>,
     failed: Arc<AtomicBool>,
@@ -86,6 +88,7 @@ impl Recorder {
             side_view: SideView::new(scene),
             events,
             frames: Vec::new(),
+            listed: 0,
             last: Last::default(),
             error: None,
             failed: Arc::default(),
@@ -184,8 +187,12 @@ impl Recorder {
         let name = format!("frames/grains_{number:04}.vtp");
         self.folder.write(&name, |file| vtk::write_grains(file, snapshot))?;
         self.frames.push((snapshot.time, name));
-        // Rewritten with each frame: a few hundred bytes, and ParaView opens even a run that was killed.
-        self.folder.write("grains.pvd", |file| vtk::write_collection(file, &self.frames))
+        // Rewritten as it grows, so that ParaView opens even a run that was killed; ever less often, so that it stays cheap.
+        if self.frames.len() > self.listed + self.listed / 64 {
+            self.folder.write("grains.pvd", |file| vtk::write_collection(file, &self.frames))?;
+            self.listed = self.frames.len();
+        }
+        Ok(())
     }
 
     fn fail(&mut self, error: Error) {

@@ -12,6 +12,9 @@ use crate::scene::{Interference, Scene, Scheme};
 /// Hit orders listed in the summary; `surface_hits.csv` has them all.
 const LISTED_ORDERS: usize = 20;
 
+/// From so many collisions on the time for each of them is worth a word.
+const MANY_COLLISIONS: u64 = 10_000;
+
 /// The numbers of a run, in SI units.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
@@ -347,7 +350,7 @@ impl Summary {
             return Ok(());
         }
         writeln!(f, "energy to the surface")?;
-        let count = |hits: u64| format!("{:>10} hits", grouped(hits));
+        let count = |hits: u64| format!("{:>10} hit{}", grouped(hits), if hits == 1 { "" } else { "s" });
         let [all, first] = [self.collisions.grain_surface, self.collisions.first_hits];
         self.energy_line(f, "first hits", surface.energy_first_hits, &count(first))?;
         self.energy_line(f, "repeated hits", surface.energy_repeated_hits, &count(all - first))?;
@@ -360,14 +363,19 @@ impl Summary {
     }
 
     fn quality(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let small = |value: f64| if value == 0.0 { "0".to_owned() } else { format!("{:.1e}", value.abs()) };
         writeln!(f, "not accounted for")?;
-        writeln!(f, "  {:<26}{:>12.1e} of E0", "energy", self.energy.residual_relative.abs())?;
-        writeln!(f, "  {:<26}{:>12.1e} of the sum of m |v|", "momentum", self.momentum_residual)?;
-        writeln!(f, "  {:<26}{:>12.1e} of the radius", "deepest overlap", self.max_overlap_over_radius)?;
-        let collisions = self.collisions.grain_grain + self.collisions.grain_surface;
-        let each = quantity(self.cpu_seconds / collisions.max(1) as f64, "s");
+        writeln!(f, "  {:<26}{:>12} of E0", "energy", small(self.energy.residual_relative))?;
+        writeln!(f, "  {:<26}{:>12} of the sum of m |v|", "momentum", small(self.momentum_residual))?;
+        writeln!(f, "  {:<26}{:>12} of the radius", "deepest overlap", small(self.max_overlap_over_radius))?;
         let [cpu, wall] = [self.cpu_seconds, self.wall_seconds].map(|seconds| quantity(seconds, "s"));
-        write!(f, "\n{cpu} of processor time in {wall}, {each} a collision")
+        write!(f, "\n{cpu} of processor time in {wall}")?;
+        let collisions = self.collisions.grain_grain + self.collisions.grain_surface;
+        // With few collisions the time goes into reading and writing.
+        if collisions < MANY_COLLISIONS {
+            return Ok(());
+        }
+        write!(f, ", {} a collision", quantity(self.cpu_seconds / collisions as f64, "s"))
     }
 
     /// Energy that came in with grains, J.

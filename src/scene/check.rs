@@ -11,10 +11,6 @@ const GRAINS_MAX: u64 = 100_000_000;
 /// Most rows of the time history and most frames: each frame is a file, each row a look at all grains.
 const ROWS_MAX: u32 = 10_000_000;
 
-/// Smallest side of a periodic domain over the largest radius. A side of two diameters makes sure that a pair can touch
-/// through one side only, never through two opposite ones at a time.
-const PERIODIC_SIDE_OVER_RADIUS: f64 = 4.0;
-
 type Checked = Result<(), Invalid>;
 
 /// Validates all of a scene that belongs to no single source or surface.
@@ -104,18 +100,18 @@ fn run(scene: &Scene) -> Checked {
 
 fn domain(scene: &Scene) -> Checked {
     let domain = &scene.domain;
-    for (i, axis) in ["x", "y", "z"].into_iter().enumerate().filter(|&(_, axis)| !(domain.planar && axis == "y")) {
-        let side = domain.max[i] - domain.min[i];
-        if !side.is_finite() || side <= 0.0 {
-            let what = format!("along {axis} the domain reaches from {} to {} m", domain.min[i], domain.max[i]);
-            return Err(Invalid::new(format!("domain.max[{i}]"), what, "`min` must be below `max` on every axis"));
+    for axis in domain.axes() {
+        if !domain.side(axis).is_finite() || domain.side(axis) <= 0.0 {
+            let name = ["x", "y", "z"][axis];
+            let what = format!("along {name} the domain reaches from {} to {} m", domain.min[axis], domain.max[axis]);
+            return Err(Invalid::new(format!("domain.max[{axis}]"), what, "`min` must be below `max` on every axis"));
         }
-        let Radius::Constant(radius) = scene.grain.radius else { continue };
-        let least = PERIODIC_SIDE_OVER_RADIUS * radius;
-        if domain.boundary == Boundary::Periodic && side < least {
-            let what = format!("along {axis} the periodic domain is {side} m wide, less than two grain diameters");
-            return Err(Invalid::new(format!("domain.max[{i}]"), what, format!("make it at least {least} m wide")));
-        }
+    }
+    if domain.boundary == Boundary::Periodic && !scene.surface.is_empty() {
+        let what =
+            "grains that leave a periodic domain come in again on the other side, but surfaces are not repeated there";
+        let remedy = "take the surfaces out, or set `domain.boundary = \"open\"`";
+        return Err(Invalid::new("surface[0]", what, remedy));
     }
     Ok(())
 }

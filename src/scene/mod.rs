@@ -118,6 +118,20 @@ pub struct Domain {
     pub planar: bool,
 }
 
+impl Domain {
+    /// The axes along which grains move: 0 for x, 1 for y, 2 for z.
+    pub fn axes(&self) -> impl Iterator<Item = usize> + use<> {
+        let planar = self.planar;
+        (0..3).filter(move |&axis| !(planar && axis == 1))
+    }
+
+    /// Length of the domain along an axis, m.
+    #[must_use]
+    pub fn side(&self, axis: usize) -> f64 {
+        self.max[axis] - self.min[axis]
+    }
+}
+
 /// What happens at the sides of the domain.
 #[derive(Clone, Copy, Debug, Default, Deserialize, Serialize, JsonSchema, PartialEq, Eq)]
 #[serde(rename_all = "kebab-case")]

@@ -10,6 +10,7 @@ use super::{Broken, GrainCollision, Observer, Passage, Progress, SurfaceHit};
 use crate::grains::{Grain, NewGrain, Snapshot};
 use crate::law::{Body, ContactLaw, resolve_pair, resolve_surface};
 use crate::scene::Interference;
+use crate::surface::LARGEST_SLOPE;
 
 /// Length of an epoch in the time that the fastest grain needs for its own radius (of the smallest grain).
 ///
@@ -18,8 +19,10 @@ const EPOCH_RADII: f64 = 4096.0;
 /// A grain that becomes so many times as fast as the fastest was, or enters so many times as small as the smallest, ends the epoch early:
 /// resolution is lost by no more than this factor.
 const OUTRUN: f64 = 8.0;
-/// Length of an epoch in which nothing moves, as a power of two, s.
+/// Exponent (of 2) of the length of an epoch in which nothing moves, s: any end is reached at once.
 const LONGEST_EPOCH: f64 = 1000.0;
+/// Shortest epoch over the time reached: below 2^-52 simulated time would stand still.
+const LEAST_EPOCH: f64 = 1.0 / (1u64 << 50) as f64;
 /// Overlap at an event, over the smaller radius, above which a run is wrong and stops. Rounding leaves about 1e-13.
 pub const LARGEST_OVERLAP: f64 = 1e-9;
 /// A run is jammed when so many encounters a grain, and [`JAM_ENCOUNTERS`] more, happen while time goes on by less than
@@ -51,7 +54,7 @@ pub struct EventDriven<S: Surface, C: Calendar = Tournament> {
     domain: Domain,
     /// Simulated time at the start of the epoch, s.
     epoch_start: f64,
-    /// Length of the epoch, s: a power of two, so that `epoch_start` stays exact.
+    /// Length of the epoch, s: a power of two, so that `epoch_start` stays exact unless an epoch ends early.
     epoch: f64,
     /// Largest speed (along any axis) at the start of the epoch, m/s.
     fastest: f64,
@@ -122,11 +125,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             self.fastest = self.fastest.max(flight.velocity.amax());
             self.smallest = self.smallest.min(flight.radius);
         }
-        let wanted = EPOCH_RADII * self.smallest / self.fastest;
-        let next = 2f64.powi(wanted.log2().floor().min(LONGEST_EPOCH) as i32);
-        self.encounters.start_epoch(after, next);
         self.epoch_start += after;
-        self.epoch = next;
+        self.epoch = epoch_length(self.smallest, self.fastest, self.epoch_start);
+        self.encounters.start_epoch(after, self.epoch);
         self.outrun = false;
         (self.mark, self.since_mark) = (0.0, 0);
     }
@@ -246,13 +247,19 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     fn hit(&mut self, time: f64, grain: u32, element: u32, observer: &mut impl Observer) -> Result<(), Broken> {
         let before = self.body(grain);
         let flight = *self.encounters.flight(grain);
-        let contact = self.encounters.surface().contact(element, &flight);
+        let mut contact = self.encounters.surface().contact(element, &flight);
+        let id = self.grains[grain as usize].id;
+        if self.domain.planar && contact.normal.y != 0.0 {
+            if contact.normal.y.abs() > LARGEST_SLOPE {
+                return Err(Broken::OutOfPlane { time: self.epoch_start + time, grain: id });
+            }
+            contact.normal = Vector3::new(contact.normal.x, 0.0, contact.normal.z).normalize();
+        }
         let resolved = resolve_surface(&self.laws.surface, &before, contact.normal, contact.velocity);
         if resolved.impulse.normal == 0.0 {
             self.encounters.deflect(&[(grain, before.velocity)]);
             return Ok(());
         }
-        let id = self.grains[grain as usize].id;
         let overlap_over_radius = -contact.gap / before.radius;
         self.check(time, &[id], overlap_over_radius, &[resolved.after.velocity])?;
         let carried = &mut self.grains[grain as usize];
@@ -352,6 +359,13 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         }
         Err(broken(self.epoch_start + time, ids, overlap, numbers))
     }
+}
+
+/// Length of an epoch that starts at simulated time `start` (s), for grains of this radius (m) and speed (m/s): a power of two.
+fn epoch_length(radius: f64, speed: f64, start: f64) -> f64 {
+    let exponent = (EPOCH_RADII * radius / speed).log2().min(LONGEST_EPOCH);
+    let least = (start.abs() * LEAST_EPOCH).log2();
+    2f64.powi(exponent.max(least).floor() as i32)
 }
 
 #[cold]

@@ -45,6 +45,14 @@ pub enum Broken {
         /// Collisions at this time.
         encounters: u64,
     },
+    /// The surface pushes a grain of a planar scene out of its plane.
+    #[error("at t = {time} s the surface would push grain {grain} of a planar scene out of the plane y = 0")]
+    OutOfPlane {
+        /// Simulated time, s.
+        time: f64,
+        /// Id of the grain.
+        grain: u64,
+    },
     /// A velocity is no finite number.
     #[error("at t = {time} s the velocity of grain {} is no finite number", list(grains))]
     NotANumber {

@@ -5,9 +5,8 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 
-use super::MOST_GRAINS;
 use super::radius::Radii;
-use super::value;
+use super::{MOST_GRAINS, check_period, value};
 use crate::grains::NewGrain;
 use crate::scene::{Invalid, Radius, Scene, Vec3};
 
@@ -39,10 +38,16 @@ impl Context<'_> {
 
     /// Radius of the source, or of `[grain]` where it has none.
     pub(super) fn radii(&self, radius: Option<&Radius>) -> Result<Radii, Invalid> {
-        match radius {
+        let radii = match radius {
             Some(radius) => Radii::new(radius, &self.key("radius")),
             None => Radii::new(&self.scene.grain.radius, "grain.radius"),
+        }?;
+        // What has no upper bound is looked at grain by grain.
+        let largest = radii.bounds().1;
+        if largest.is_finite() {
+            check_period(&self.scene.domain, largest)?;
         }
+        Ok(radii)
     }
 
     /// Density of the source (kg/m³), or of `[grain]` where it has none.
@@ -108,8 +113,7 @@ impl Context<'_> {
 
     /// The axes along which grains can move.
     pub(super) fn axes(&self) -> impl Iterator<Item = usize> + use<> {
-        let planar = self.planar();
-        (0..3).filter(move |&axis| !(planar && axis == 1))
+        self.scene.domain.axes()
     }
 
     /// Refuses more grains than a machine can hold, and none at all.

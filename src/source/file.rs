@@ -5,7 +5,8 @@
 //! comments.
 
 use std::fs::File;
-use std::path::Path;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
 
 use csv::{ErrorKind, ReaderBuilder, StringRecord, Trim};
 use nalgebra::Vector3;
@@ -28,15 +29,15 @@ const ZERO_IN_PLANE: [usize; 4] = [1, 4, 6, 8];
 /// Reads the table of `source`, whose path starts from `folder`.
 pub(super) fn read(source: &FileSource, folder: &Path, context: &Context<'_>) -> Result<Vec<NewGrain>, Invalid> {
     let path = folder.join(&source.path);
-    let table = Table { path: path.display().to_string(), key: context.key("path"), planar: context.planar() };
-    let file = File::open(&path).map_err(|error| {
+    let table = Table { path, key: context.key("path"), planar: context.planar() };
+    let file = File::open(&table.path).map_err(|error| {
         table.invalid(
             format!("cannot be read: {error}"),
             "correct the path; it starts from the folder of the scene file",
         )
     })?;
     let mut reader = ReaderBuilder::new().trim(Trim::All).comment(Some(b'#')).from_reader(file);
-    let columns = table.columns(reader.headers().map_err(|error| table.unreadable(&error))?)?;
+    let columns = table.columns(reader.headers().map_err(|error| table.unreadable(&error, None))?)?;
 
     let mut fallback = Fallback { rng: context.rng(), radii: None, density: None };
     if columns[RADIUS].is_none() {
@@ -47,14 +48,29 @@ pub(super) fn read(source: &FileSource, folder: &Path, context: &Context<'_>) ->
     }
     let mut grains = Vec::new();
     for record in reader.into_records() {
-        let record = record.map_err(|error| table.unreadable(&error))?;
-        grains.push(table.grain(&record, &columns, &mut fallback)?);
+        let row = grains.len();
+        let record = record.map_err(|error| table.unreadable(&error, Some(row)))?;
+        grains.push(table.grain(row, &record, &columns, &mut fallback)?);
     }
     if grains.is_empty() {
         return Err(table.invalid("has no rows", "add a row for each grain below the header"));
     }
     context.check_count("path", grains.len() as u128)?;
     Ok(grains)
+}
+
+/// The line on which row number `row` (from 0, below the header) of the table at `path` stands, blank lines and comments counted.
+///
+/// It is looked up when a message needs it, so that grains need not carry it. Rows of numbers do not go over several lines.
+fn line_in(path: &Path, row: usize) -> Option<usize> {
+    let lines = BufReader::new(File::open(path).ok()?).split(b'\n').map_while(Result::ok).zip(1..);
+    let rows = lines.filter(|(line, _)| !matches!(line.as_slice(), [] | b"\r" | [b'#', ..]));
+    Some(rows.skip(1).nth(row)?.1)
+}
+
+/// The line on which grain number `row` (from 0) of `source` stands.
+pub(super) fn line_of(source: &FileSource, folder: &Path, row: usize) -> Option<usize> {
+    line_in(&folder.join(&source.path), row)
 }
 
 /// Where each of `COLUMNS` stands in the table, if it does.
@@ -69,7 +85,7 @@ struct Fallback {
 
 /// What messages say about the table.
 struct Table {
-    path: String,
+    path: PathBuf,
     key: String,
     planar: bool,
 }
@@ -106,9 +122,14 @@ impl Table {
         }
     }
 
-    fn grain(&self, record: &StringRecord, columns: &Columns, fallback: &mut Fallback) -> Result<NewGrain, Invalid> {
-        let value =
-            |column: usize| columns[column].map(|place| self.number(record, column, &record[place])).transpose();
+    fn grain(
+        &self,
+        row: usize,
+        record: &StringRecord,
+        columns: &Columns,
+        fallback: &mut Fallback,
+    ) -> Result<NewGrain, Invalid> {
+        let value = |column: usize| columns[column].map(|place| self.number(row, column, &record[place])).transpose();
         let vector = |first: usize| -> Result<Vector3<f64>, Invalid> {
             let [x, y, z] = [value(first)?, value(first + 1)?, value(first + 2)?];
             Ok(Vector3::new(x.unwrap_or(0.0), y.unwrap_or(0.0), z.unwrap_or(0.0)))
@@ -123,11 +144,10 @@ impl Table {
         })
     }
 
-    fn number(&self, record: &StringRecord, column: usize, text: &str) -> Result<f64, Invalid> {
+    fn number(&self, row: usize, column: usize, text: &str) -> Result<f64, Invalid> {
         let refuse = |what: &str, remedy: &str| {
-            let line = record.position().map_or(0, csv::Position::line);
             let shown: String = text.chars().take(40).collect();
-            Err(self.invalid(format!("line {line}, column `{}`: `{shown}` {what}", COLUMNS[column]), remedy))
+            Err(self.invalid(format!("{}column `{}`: `{shown}` {what}", self.line(Some(row)), COLUMNS[column]), remedy))
         };
         match text.parse::<f64>() {
             Err(_) => refuse("is not a number", "write a number such as 0.25 or -1.5e-3"),
@@ -144,8 +164,13 @@ impl Table {
         }
     }
 
-    fn unreadable(&self, error: &csv::Error) -> Invalid {
-        let line = error.position().map_or_else(String::new, |position| format!("line {}: ", position.line()));
+    /// What a message about a row begins with; of the header when there is no row yet.
+    fn line(&self, row: Option<usize>) -> String {
+        row.and_then(|row| line_in(&self.path, row)).map_or_else(String::new, |line| format!("line {line}: "))
+    }
+
+    fn unreadable(&self, error: &csv::Error, row: Option<usize>) -> Invalid {
+        let line = self.line(row);
         match error.kind() {
             ErrorKind::UnequalLengths { expected_len, len, .. } => self.invalid(
                 format!("{line}{len} values, but the header has {expected_len} columns"),
@@ -159,6 +184,6 @@ impl Table {
     }
 
     fn invalid(&self, what: impl AsRef<str>, remedy: impl Into<String>) -> Invalid {
-        Invalid::new(&self.key, format!("{}: {}", self.path, what.as_ref()), remedy)
+        Invalid::new(&self.key, format!("{}: {}", self.path.display(), what.as_ref()), remedy)
     }
 }

@@ -21,7 +21,7 @@ use nalgebra::Vector3;
 pub use nozzle::Nozzle;
 
 use crate::grains::NewGrain;
-use crate::scene::{Domain, Invalid, Scene, Source};
+use crate::scene::{Boundary, Domain, Invalid, Scene, Source};
 use cells::Cells;
 use context::Context;
 
@@ -47,11 +47,13 @@ pub struct Placed {
 
 /// Places the grains of all sources of `scene`; relative paths start from `folder`.
 ///
-/// `surface_overlap` gets the centre (m) and radius (m) of a grain and says how deep it lies in the surface (m), or `None`.
+/// `surface_overlap` gets the centre (m) and radius (m) of a grain and says in which surface of the scene it lies the deepest
+/// and how deep (m), or `None`.
 ///
 /// # Errors
 /// A value of a source that cannot be used; a table that cannot be read; grains that overlap each other or the surface, or
-/// lie outside the domain; a block that cannot hold its grains; more grains than any machine can hold.
+/// lie outside the domain, or are too large for a periodic one; a block that cannot hold its grains; more grains than any
+/// machine can hold.
 ///
 /// ```
 /// let scene: impinge::scene::Scene = toml::from_str(
@@ -74,7 +76,7 @@ pub struct Placed {
 pub fn place(
     scene: &Scene,
     folder: &Path,
-    surface_overlap: &dyn Fn(Vector3<f64>, f64) -> Option<f64>,
+    surface_overlap: &dyn Fn(Vector3<f64>, f64) -> Option<(usize, f64)>,
 ) -> Result<Placed, Invalid> {
     let mut placed = Placed::default();
     let mut cells = Cells::new(&scene.domain);
@@ -92,9 +94,10 @@ pub fn place(
         placed.counts.push(grains.len());
         for grain in grains {
             let id = placed.grains.len();
-            check_alone(scene, number, id, &grain, &cells, surface_overlap)?;
+            let origins = Origins { scene, folder, counts: &placed.counts };
+            check_alone(&origins, id, &grain, surface_overlap)?;
             if !matches!(source, Source::Block(_)) {
-                check_neighbours(scene, &placed, id, &grain, &cells)?;
+                check_neighbours(&origins, &placed.grains, id, &grain, &cells)?;
                 cells.insert(id as u32, grain.position, grain.radius);
             }
             placed.grains.push(grain);
@@ -103,47 +106,106 @@ pub fn place(
     Ok(placed)
 }
 
+/// Where grains come from, as messages say it.
+struct Origins<'a> {
+    scene: &'a Scene,
+    folder: &'a Path,
+    /// How many grains each source has placed so far.
+    counts: &'a [usize],
+}
+
+impl Origins<'_> {
+    /// The source of grain `id`, and the number of the grain in it.
+    fn source_of(&self, id: usize) -> (usize, usize) {
+        let mut first = 0;
+        for (number, count) in self.counts.iter().enumerate() {
+            if id < first + count {
+                return (number, id - first);
+            }
+            first += count;
+        }
+        unreachable!("every grain has a source")
+    }
+
+    /// The key that a fault of grain `id` is reported under: a row of a table is to blame on the table.
+    fn key(&self, id: usize) -> String {
+        let (number, _) = self.source_of(id);
+        match self.scene.source[number] {
+            Source::File(_) => format!("source[{number}].path"),
+            _ => format!("source[{number}]"),
+        }
+    }
+
+    /// What messages call grain `id`.
+    fn name(&self, id: usize) -> String {
+        let (number, row) = self.source_of(id);
+        let Source::File(table) = &self.scene.source[number] else { return format!("grain {id} of source[{number}]") };
+        match file::line_of(table, self.folder, row) {
+            Some(line) => format!("grain {id} ({}, line {line})", table.path),
+            None => format!("grain {id} ({})", table.path),
+        }
+    }
+}
+
 /// Refuses a grain that cannot be where it is, whatever the other grains do.
 fn check_alone(
-    scene: &Scene,
-    number: usize,
+    origins: &Origins<'_>,
     id: usize,
     grain: &NewGrain,
-    cells: &Cells,
-    surface_overlap: &dyn Fn(Vector3<f64>, f64) -> Option<f64>,
+    surface_overlap: &dyn Fn(Vector3<f64>, f64) -> Option<(usize, f64)>,
 ) -> Result<(), Invalid> {
-    let key = format!("source[{number}]");
+    let domain = &origins.scene.domain;
     let [x, y, z] = grain.position.data.0[0];
-    let named = format!("grain {id} at ({x}, {y}, {z}), radius {},", grain.radius);
-    if !is_inside(&scene.domain, grain.position) {
-        let (min, max) = (scene.domain.min, scene.domain.max);
-        return Err(Invalid::new(
-            key,
-            format!("{named} has its centre outside the domain, which goes from {min:?} to {max:?}"),
-            "move the source or enlarge the domain",
-        ));
+    let refuse = |what: &str, remedy: &str| {
+        let name = origins.name(id);
+        let what = format!("{name} at ({x}, {y}, {z}), radius {} m, {what}", grain.radius);
+        Err(Invalid::new(origins.key(id), what, remedy))
+    };
+    if !is_inside(domain, grain.position) {
+        let what = format!("has its centre outside the domain, which goes from {:?} to {:?}", domain.min, domain.max);
+        return refuse(&what, "move the grain or enlarge the domain");
     }
-    let period = cells.period();
-    let depths = period.iter().filter(|period| **period > 0.0).map(|period| 2.0 * grain.radius - period);
-    if let Some(depth) = depths.reduce(f64::max).filter(|depth| *depth > OVERLAP_TOLERANCE * grain.radius) {
-        return Err(Invalid::new(
-            key,
-            format!("{named} overlaps its own periodic image by {depth:.3e} m"),
-            "enlarge the domain or make the grain smaller",
-        ));
-    }
+    check_period(domain, grain.radius)?;
     match surface_overlap(grain.position, grain.radius) {
-        Some(depth) if depth > OVERLAP_TOLERANCE * grain.radius => Err(Invalid::new(
-            key,
-            format!("{named} overlaps the surface by {depth:.3e} m"),
-            "move the source away from the surface",
-        )),
+        Some((surface, depth)) if depth > OVERLAP_TOLERANCE * grain.radius => {
+            refuse(&format!("overlaps surface[{surface}] by {depth:.3e} m"), "move the grain away from the surface")
+        }
         _ => Ok(()),
     }
 }
 
+/// Refuses a periodic domain that is too narrow for grains of this radius (m).
+fn check_period(domain: &Domain, radius: f64) -> Result<(), Invalid> {
+    let least = impinge_events::least_period(radius);
+    let narrow =
+        domain.axes().filter(|_| domain.boundary == Boundary::Periodic).find(|&axis| domain.side(axis) < least);
+    let Some(axis) = narrow else { return Ok(()) };
+    let (name, side) = (["x", "y", "z"][axis], domain.side(axis));
+    Err(Invalid::new(
+        format!("domain.max[{axis}]"),
+        format!(
+            "along {name} the periodic domain is {} m wide, too narrow for grains of radius {} m",
+            brief(side),
+            brief(radius)
+        ),
+        // What stands there after rounding is enough.
+        format!("make it at least {} m wide (eight radii and a little), or the grains smaller", brief(1.00001 * least)),
+    ))
+}
+
+/// A number to six digits.
+fn brief(number: f64) -> f64 {
+    format!("{number:.5e}").parse().unwrap_or(number)
+}
+
 /// Refuses a grain that overlaps one that is there already.
-fn check_neighbours(scene: &Scene, placed: &Placed, id: usize, grain: &NewGrain, cells: &Cells) -> Result<(), Invalid> {
+fn check_neighbours(
+    origins: &Origins<'_>,
+    placed: &[NewGrain],
+    id: usize,
+    grain: &NewGrain,
+    cells: &Cells,
+) -> Result<(), Invalid> {
     let mut partner = None;
     cells.any_near(grain.position, grain.radius, |item, offset| {
         let depth = grain.radius + item.radius - offset.norm();
@@ -153,17 +215,15 @@ fn check_neighbours(scene: &Scene, placed: &Placed, id: usize, grain: &NewGrain,
         partner.is_some()
     });
     let Some((other, depth)) = partner else { return Ok(()) };
-    let number = placed.counts.len() - 1;
-    let other_number = source_of(&placed.counts, other);
-    Err(Invalid::new(
-        format!("source[{number}]"),
-        format!(
-            "grain {id} (of source[{number}]) and grain {other} (of source[{other_number}]) overlap by {depth:.3e} m; \
-             their radii are {} and {}",
-            grain.radius, placed.grains[other].radius
-        ),
-        remedy_for_overlap(scene, other_number, number),
-    ))
+    let what = format!(
+        "{} and {} overlap by {depth:.3e} m; their radii are {} and {} m",
+        origins.name(other),
+        origins.name(id),
+        placed[other].radius,
+        grain.radius
+    );
+    let remedy = remedy_for_overlap(origins.scene, origins.source_of(other).0, origins.source_of(id).0);
+    Err(Invalid::new(origins.key(id), what, remedy))
 }
 
 fn remedy_for_overlap(scene: &Scene, first: usize, second: usize) -> String {
@@ -184,21 +244,7 @@ fn remedy_for_overlap(scene: &Scene, first: usize, second: usize) -> String {
     }
 }
 
-/// Which source the grain `id` came from.
-fn source_of(counts: &[usize], id: usize) -> usize {
-    let mut end = 0;
-    counts
-        .iter()
-        .position(|count| {
-            end += count;
-            id < end
-        })
-        .expect("every grain has a source")
-}
-
 /// Whether a centre lies in the domain; NaN does not.
 fn is_inside(domain: &Domain, position: Vector3<f64>) -> bool {
-    (0..3)
-        .filter(|&axis| !(domain.planar && axis == 1))
-        .all(|axis| domain.min[axis] <= position[axis] && position[axis] <= domain.max[axis])
+    domain.axes().all(|axis| domain.min[axis] <= position[axis] && position[axis] <= domain.max[axis])
 }

@@ -10,7 +10,7 @@ use super::context::Context;
 use super::radius::Radii;
 use super::{is_inside, value};
 use crate::grains::{NewGrain, sphere_volume};
-use crate::scene::{Flow, Invalid, NozzleShape, NozzleSource, Scene};
+use crate::scene::{Boundary, Flow, Invalid, NozzleShape, NozzleSource, Scene};
 
 /// Places that are tried for a grain before it is deferred. With so many a twentieth of the opening that is free is found in
 /// 96 of 100 attempts; more would only cost time where the opening is full.
@@ -69,6 +69,12 @@ impl Nozzle {
         let opening = Opening::new(source, &context)?;
         let speed = value::positive(&context.key("speed"), source.speed)?;
         let radii = context.radii(source.radius.as_ref())?;
+        if scene.domain.boundary == Boundary::Periodic && radii.bounds().1.is_infinite() {
+            let what =
+                "a lognormal radius has no upper bound, and sooner or later a grain would be too large for the domain";
+            let remedy = "in a periodic domain give the nozzle a constant, uniform or normal radius";
+            return Err(Invalid::new(context.key("radius"), what, remedy));
+        }
         let flux = flux(source.flow, &opening, speed, &radii, &context)?;
         let start = value::finite(&context.key("start"), source.start)?;
         let stop = match source.stop {

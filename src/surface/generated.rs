@@ -15,7 +15,7 @@ pub(super) fn disc(disc: &DiscSurface, key: &str) -> Result<Vec<Triangle>, Inval
     positive(disc.radius, &format!("{key}.radius"))?;
     if disc.segments < 3 {
         let what = format!("{} corners do not make a disc", disc.segments);
-        return Err(Invalid::new(format!("{key}.segments"), what, "Give 3 or more."));
+        return Err(Invalid::new(format!("{key}.segments"), what, "give 3 or more"));
     }
     few_enough(u64::from(disc.segments), &format!("{key}.segments"))?;
     let centre = Vector3::from(disc.centre);
@@ -37,7 +37,7 @@ pub(super) fn rectangle(rectangle: &RectangleSurface, key: &str) -> Result<Vec<T
     // Nearer to parallel than this, what is left of `along` is its rounding.
     if along.norm() < 1e-9 {
         let what = format!("{:?} is parallel to the normal", rectangle.along);
-        return Err(Invalid::new(format!("{key}.along"), what, "Give the direction of one side."));
+        return Err(Invalid::new(format!("{key}.along"), what, "give the direction of one side"));
     }
     let along = along.normalize();
     let across = normal.cross(&along);
@@ -59,7 +59,7 @@ pub(super) fn sine(sine: &SineSurface, key: &str) -> Result<Vec<Triangle>, Inval
         return Err(Invalid::new(
             format!("{key}.amplitude"),
             format!("{} is not finite", sine.amplitude),
-            "Give a height.",
+            "give a height",
         ));
     }
     // The conversion saturates, and is then refused as too many.
@@ -88,7 +88,7 @@ fn positive(value: f64, key: &str) -> Result<(), Invalid> {
     if value > 0.0 && value.is_finite() {
         return Ok(());
     }
-    Err(Invalid::new(key, format!("{value} is not a size"), "Give a value above 0."))
+    Err(Invalid::new(key, format!("{value} is not a size"), "give a value above 0"))
 }
 
 fn few_enough(triangles: u64, key: &str) -> Result<(), Invalid> {
@@ -96,5 +96,5 @@ fn few_enough(triangles: u64, key: &str) -> Result<(), Invalid> {
         return Ok(());
     }
     let what = format!("would make {triangles} triangles");
-    Err(Invalid::new(key, what, format!("Stay below {MOST_TRIANGLES} triangles.")))
+    Err(Invalid::new(key, what, format!("stay below {MOST_TRIANGLES} triangles")))
 }

@@ -84,25 +84,25 @@ impl fmt::Display for Report {
 pub(super) fn read(path: &Path, key: &str) -> Result<Vec<Triangle>, Invalid> {
     let bad = |what: String, remedy: &str| Invalid::new(key, format!("{}: {what}", path.display()), remedy);
     let bytes = std::fs::read(path).map_err(|error| {
-        bad(format!("cannot be read: {error}"), "Give the path of an STL or OBJ file, relative to the scene file.")
+        bad(format!("cannot be read: {error}"), "give the path of an STL or OBJ file, relative to the scene file")
     })?;
     if bytes.iter().all(u8::is_ascii_whitespace) {
-        return Err(bad("the file is empty".into(), "Export the mesh again."));
+        return Err(bad("the file is empty".into(), "export the mesh again"));
     }
     let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
     let triangles = match extension.to_str() {
         Some("stl") => read_stl(&bytes),
         Some("obj") => read_obj(&bytes),
-        _ => return Err(bad("neither .stl nor .obj".into(), "Export the mesh as STL or OBJ.")),
+        _ => return Err(bad("neither .stl nor .obj".into(), "export the mesh as STL or OBJ")),
     };
-    let triangles = triangles.map_err(|what| bad(what, "Export the mesh again, as triangles."))?;
+    let triangles = triangles.map_err(|what| bad(what, "export the mesh again, as triangles"))?;
     if triangles.is_empty() {
-        return Err(bad("no triangles".into(), "Export a mesh of triangles."));
+        return Err(bad("no triangles".into(), "export a mesh of triangles"));
     }
     match triangles.iter().position(|corners| corners.iter().any(|corner| !corner.iter().all(|x| x.is_finite()))) {
         Some(number) => Err(bad(
             format!("triangle {number} has a corner that is not finite"),
-            "Repair the mesh, then export it again.",
+            "repair the mesh, then export it again",
         )),
         None => Ok(triangles),
     }
@@ -137,6 +137,12 @@ fn binary_stl_size(bytes: &[u8]) -> Option<u64> {
 /// Makes one solid with a plain name of an ASCII file with one or several; the reader knows no more.
 fn one_solid(bytes: &[u8]) -> Result<Vec<u8>, String> {
     let text = String::from_utf8_lossy(bytes);
+    for (number, line) in text.lines().map(str::trim).enumerate().filter(|(_, line)| line.starts_with("vertex")) {
+        let numbers = line.split_whitespace().skip(1).map(str::parse::<f32>);
+        if numbers.filter(|number| number.as_ref().is_ok_and(|x| x.is_finite())).count() != 3 {
+            return Err(format!("line {}: `{line}` is not a corner of three finite numbers", number + 1));
+        }
+    }
     let lines: Vec<_> = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
     if !lines.last().is_some_and(|line| line.starts_with("endsolid")) {
         return Err("truncated: the last line is not `endsolid`".into());
@@ -185,10 +191,10 @@ pub(super) fn mend(triangles: &[Triangle], key: &str) -> Result<(Mesh, Report), 
         }
     }
     if kept.is_empty() {
-        return Err(Invalid::new(key, "no triangle has an area", "Repair the mesh, then export it again."));
+        return Err(Invalid::new(key, "no triangle has an area", "repair the mesh, then export it again"));
     }
     let mesh = Mesh::new(vertices, kept)
-        .map_err(|bad| Invalid::new(key, bad.to_string(), "Repair the mesh, then export it again."))?;
+        .map_err(|bad| Invalid::new(key, bad.to_string(), "repair the mesh, then export it again"))?;
     let area = |number: usize| {
         let [a, b, c] = mesh.triangle(number);
         0.5 * (b - a).cross(&(c - a)).norm()

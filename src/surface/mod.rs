@@ -14,6 +14,10 @@ mod generated;
 mod index;
 mod mesh;
 
+/// Largest y of a unit normal that still counts as lying in the plane of a planar scene: STL files keep seven digits. What is
+/// left is dropped at each hit, so the grain is turned by as much.
+pub const LARGEST_SLOPE: f64 = 1e-5;
+
 /// Three corners, m.
 pub type Triangle = [Vector3<f64>; 3];
 
@@ -73,7 +77,7 @@ impl Surface {
             let first_element = made.elements;
             made.elements = first_element
                 .checked_add(shape.elements())
-                .ok_or_else(|| Invalid::new(&key, "more triangles than can be numbered", "Use a coarser mesh."))?;
+                .ok_or_else(|| Invalid::new(&key, "more triangles than can be numbered", "use a coarser mesh"))?;
             made.parts.push(Part { first_element, velocity, moves, offset: Vector3::zeros(), shape });
         }
         Ok(made)
@@ -121,10 +125,50 @@ impl Surface {
         overlaps.reduce(|deepest, other| if other.1 > deepest.1 { other } else { deepest })
     }
 
-    /// The surface to which `element` belongs.
+    /// Refuses a mesh that would push the grains of a planar scene out of the plane y = 0.
+    ///
+    /// Where the mesh meets the plane its faces must run along y. What lies beside the plane, as the caps of a prism do, is out
+    /// of reach; a cap so near that grains touch it all the same stops the run at the hit.
+    ///
+    /// # Errors
+    /// The first triangle that meets the plane at a slant, or a mesh that does not meet it at all.
+    pub fn check_planar(&self) -> Result<(), Invalid> {
+        for (number, part) in self.parts.iter().enumerate() {
+            let Some(mesh) = part.mesh().map(Index::mesh) else { continue };
+            let refuse = |what: String| {
+                let remedy =
+                    "give a planar scene a surface that does not change along y, or set `domain.planar = false`";
+                Err(Invalid::new(format!("surface[{number}]"), what, remedy))
+            };
+            let meets = |corners: &Triangle| {
+                corners.iter().any(|corner| corner.y <= 0.0) && corners.iter().any(|corner| corner.y >= 0.0)
+            };
+            let mut met = (0..mesh.len()).filter(|&triangle| meets(&mesh.triangle(triangle))).peekable();
+            if met.peek().is_none() {
+                return refuse("it does not meet the plane y = 0, in which all grains of a planar scene are".into());
+            }
+            let slope = |triangle: usize| {
+                let [a, b, c] = mesh.triangle(triangle);
+                (b - a).cross(&(c - a)).normalize().y
+            };
+            if let Some(triangle) = met.find(|&triangle| slope(triangle).abs() > LARGEST_SLOPE) {
+                let normal = slope(triangle);
+                return refuse(format!(
+                    "triangle {triangle} would push grains out of the plane y = 0: its normal has y = {normal:.3}"
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Which `[[surface]]` of the scene, counted from 0, `element` belongs to.
+    #[must_use]
+    pub fn number_of(&self, element: u32) -> usize {
+        self.parts.partition_point(|part| part.first_element <= element) - 1
+    }
+
     fn part(&self, element: u32) -> &Part {
-        let next = self.parts.partition_point(|part| part.first_element <= element);
-        &self.parts[next - 1]
+        &self.parts[self.number_of(element)]
     }
 }
 
@@ -275,7 +319,7 @@ fn shape(surface: &scene::Surface, folder: &Path, key: &str) -> Result<(Shape, V
             let offset = finite(file.offset, &format!("{key}.offset"))?;
             if !(file.scale.is_finite() && file.scale != 0.0) {
                 let what = format!("{} is not a scale", file.scale);
-                return Err(Invalid::new(format!("{key}.scale"), what, "Give the metres per unit of the file."));
+                return Err(Invalid::new(format!("{key}.scale"), what, "give the metres per unit of the file"));
             }
             let mut triangles = mesh::read(&folder.join(&file.path), &path_key)?;
             triangles.iter_mut().flatten().for_each(|corner| *corner = *corner * file.scale + offset);
@@ -294,13 +338,13 @@ fn finite(vector: Vec3, key: &str) -> Result<Vector3<f64>, Invalid> {
     if vector.iter().all(|x| x.is_finite()) {
         return Ok(vector.into());
     }
-    Err(Invalid::new(key, format!("{vector:?} is not finite"), "Give three finite numbers."))
+    Err(Invalid::new(key, format!("{vector:?} is not finite"), "give three finite numbers"))
 }
 
 fn unit(vector: Vec3, key: &str) -> Result<Vector3<f64>, Invalid> {
     let direction = finite(vector, key)?;
     if direction == Vector3::zeros() {
-        return Err(Invalid::new(key, format!("{vector:?} has no direction"), "Give any vector but 0."));
+        return Err(Invalid::new(key, format!("{vector:?} has no direction"), "give any vector but 0"));
     }
     // In units of its largest component nothing overflows or underflows.
     Ok((direction / direction.amax()).normalize())

@@ -42,12 +42,14 @@ pub fn energy_history(title: &str, history: &History, brought_in: f64) -> io::Re
         points: moments.iter().map(|moment| (moment.time / time.factor, of(moment) / brought_in)).collect(),
     };
     let mut curves = vec![curve("kinetic energy inside", MUTED, |moment| moment.kinetic_energy)];
+    let mut shows = "Kinetic energy";
     if last.grain_surface > 0 {
         curves.push(curve("first hits", GREEN, |moment| moment.surface_first));
         curves.push(curve("repeated hits", ORANGE, |moment| moment.surface_repeated));
         curves.push(curve("all hits", BLUE, |moment| moment.surface_all));
+        shows = "Energy brought to the surface so far, and kinetic energy";
     }
-    let shows = format!("Energy brought to the surface so far, and kinetic energy; E0 = {}", quantity(brought_in, "J"));
+    let shows = format!("{shows}; E0 = {} brought in until the end", quantity(brought_in, "J"));
     picture(SIZE, title, &shows, |area| {
         draw_curves(area, &curves, &format!("time ({}s)", time.symbol))?;
         draw_key(area, curves)

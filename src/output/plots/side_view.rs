@@ -35,6 +35,8 @@ const GAP: i32 = 14;
 const BAR: i32 = 120;
 /// A grain that would be smaller than this on the screen is drawn as large as this, pixels.
 const SMALLEST: f64 = 0.5;
+/// Least thickness of a surface on the screen, units of drawing.
+const THINNEST: i32 = 2 * FINE;
 const SURFACE: RGBColor = RGBColor(0xcf, 0xcb, 0xc4);
 
 /// One moment.
@@ -143,7 +145,9 @@ impl View {
         (low, high) = (middle - half, middle + half);
         let aspect = half.x / half.y;
         let count = side_view.stills.len();
+        // No row but the last is short, and that by one at most.
         let shapes = (1..=count).map(|columns| (columns, count.div_ceil(columns)));
+        let shapes = shapes.filter(|(columns, rows)| columns * rows <= count + 1);
         let width = |(columns, rows): (usize, usize)| (ROOM[0] / columns as f64).min(ROOM[1] / rows as f64 * aspect);
         let (columns, rows) = shapes.max_by(|a, b| width(*a).total_cmp(&width(*b)))?;
         let width = width((columns, rows));
@@ -194,7 +198,10 @@ impl View {
         }
         for &[left, bottom, right, top] in &surface.blocks {
             let unit = |cell: usize| (cell as f64 * f64::from(FINE) / CELLS).round() as i32;
-            let ends = [(unit(left), height * FINE - unit(top)), (unit(right), height * FINE - unit(bottom))];
+            // A sheet seen edge on is as thin as a cell, and would be lost between the pixels.
+            let (low, high) = (unit(bottom), unit(top).max(unit(bottom) + THINNEST));
+            let ends =
+                [(unit(left), height * FINE - high), (unit(right).max(unit(left) + THINNEST), height * FINE - low)];
             panel.draw(&Rectangle::new(ends, SURFACE.filled()))?;
         }
         self.draw_grains(&panel, &still.discs)?;
@@ -223,7 +230,7 @@ impl View {
     /// Draws the axes of a panel: numbers on the left of the first column and under the last row only.
     fn draw_frame(&self, area: &Area<'_>, [left, top]: [i32; 2], first: bool, lowest: bool) -> Drawn {
         let [width, height] = self.panel;
-        let unit = Prefix::of((self.high - self.low).max() / 2.0);
+        let unit = Prefix::of((self.high - self.low).max());
         let [low, high] = [self.low, self.high].map(|end| end / unit.factor);
         let [left_room, bottom_room] = [if first { LEFT - 10 } else { 0 }, if lowest { BOTTOM } else { 0 }];
         let around = [left - left_room, top, width + left_room, height + bottom_room];
@@ -231,6 +238,9 @@ impl View {
             .set_label_area_size(LabelAreaPosition::Left, fine(left_room))
             .set_label_area_size(LabelAreaPosition::Bottom, fine(bottom_room))
             .build_cartesian_2d(low.x..high.x, low.y..high.y)?;
+        // A number at the very end of a panel would run into that of the next panel.
+        let clear_of_ends = |x: f64| (x - low.x).min(high.x - x) > 0.05 * (high.x - low.x);
+        let across = |x: &f64| if clear_of_ends(*x) { tick(*x) } else { String::new() };
         let mut mesh = chart.configure_mesh();
         mesh.disable_mesh()
             .axis_style(FRAME.stroke_width(fine(1)))
@@ -239,7 +249,7 @@ impl View {
             .set_all_tick_mark_size(fine(4))
             .x_labels(5)
             .y_labels(5)
-            .x_label_formatter(&|value| tick(*value))
+            .x_label_formatter(&across)
             .y_label_formatter(&|value| tick(*value));
         if first {
             mesh.y_desc(format!("z ({}m)", unit.symbol));
