@@ -47,3 +47,8 @@ pub use flight::Flight;
 pub use mesh::{BadTriangle, Mesh};
 pub use neighbors::least_period;
 pub use surface::{NoSurface, Outlook, Surface, SurfaceContact};
+
+/// The program in README.md runs too.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -42,6 +42,12 @@ pub trait Surface {
     /// The contact between `element` and a flight that has been advanced to the moment of contact.
     fn contact(&self, element: u32, flight: &Flight) -> SurfaceContact;
 
+    /// The largest speed of any part of it along an axis, m/s; a surface that moves must say so, or times late in an epoch in which all
+    /// grains rest are coarse.
+    fn speed(&self) -> f64 {
+        0.0
+    }
+
     /// Starts a new epoch `duration` seconds later: moving parts go on by their velocity, times count from there.
     fn start_epoch(&mut self, duration: f64);
 }

@@ -16,8 +16,11 @@ use crate::surface::LARGEST_SLOPE;
 ///
 /// Within an epoch a time is known to 2^-53 of the epoch, so a position to 4096 × 2^-53 = 5e-13 radii.
 const EPOCH_RADII: f64 = 4096.0;
-/// Length of an epoch in which nothing moves, s; twice the time reached where that is longer.
-const IDLE_EPOCH: f64 = (1u64 << 20) as f64;
+/// A grain that becomes so many times as fast as the fastest was, or enters so many times as small as the smallest, ends the epoch early:
+/// resolution is lost by no more than this factor.
+const OUTRUN: f64 = 8.0;
+/// Exponent (of 2) of the length of an epoch in which nothing moves, s: any end is reached at once.
+const LONGEST_EPOCH: f64 = 1000.0;
 /// Shortest epoch over the time reached: below 2^-52 simulated time would stand still.
 const LEAST_EPOCH: f64 = 1.0 / (1u64 << 50) as f64;
 /// Overlap at an event, over the smaller radius, above which a run is wrong and stops. Rounding leaves about 1e-13.
@@ -51,8 +54,14 @@ pub struct EventDriven<S: Surface, C: Calendar = Tournament> {
     domain: Domain,
     /// Simulated time at the start of the epoch, s.
     epoch_start: f64,
-    /// Length of the epoch, s: a power of two, so that `epoch_start` stays exact, unless an entry cuts it short.
+    /// Length of the epoch, s: a power of two, so that `epoch_start` stays exact unless an epoch ends early.
     epoch: f64,
+    /// Largest speed (along any axis) at the start of the epoch, m/s.
+    fastest: f64,
+    /// Smallest radius at the start of the epoch, m; infinity where there were no grains.
+    smallest: f64,
+    /// Whether a grain has become too fast for the epoch.
+    outrun: bool,
     /// Simulated time that has been reached, s.
     time: f64,
     entered: u64,
@@ -81,6 +90,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             domain,
             epoch_start: start,
             epoch: 0.0,
+            fastest: 0.0,
+            smallest: f64::INFINITY,
+            outrun: false,
             time: start,
             entered,
             collisions: 0,
@@ -88,7 +100,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             since_mark: 0,
             mark: 0.0,
         };
-        scheme.start_epoch();
+        scheme.start_epoch(0.0);
         scheme
     }
 
@@ -104,28 +116,23 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.encounters.surface()
     }
 
-    /// Simulated time at the end of the current epoch, s.
-    pub fn epoch_end(&self) -> f64 {
-        self.epoch_start + self.epoch
-    }
-
-    /// Starts the next epoch at the end of the current one, and chooses its length by the fastest and the smallest grain.
-    pub fn start_epoch(&mut self) {
-        let mut fastest = 0f64;
-        let mut smallest = f64::INFINITY;
+    /// Starts an epoch `after` seconds into the current one, and chooses its length by the fastest and the smallest grain.
+    fn start_epoch(&mut self, after: f64) {
+        self.fastest = self.encounters.surface().speed();
+        self.smallest = f64::INFINITY;
         for grain in self.encounters.inside() {
             let flight = self.encounters.flight(grain);
-            fastest = fastest.max(flight.velocity.norm());
-            smallest = smallest.min(flight.radius);
+            self.fastest = self.fastest.max(flight.velocity.amax());
+            self.smallest = self.smallest.min(flight.radius);
         }
-        let start = self.epoch_start + self.epoch;
-        let next = epoch_length(smallest, fastest, start);
-        self.encounters.start_epoch(self.epoch, next);
-        (self.epoch_start, self.epoch) = (start, next);
+        self.epoch_start += after;
+        self.epoch = epoch_length(self.smallest, self.fastest, self.epoch_start);
+        self.encounters.start_epoch(after, self.epoch);
+        self.outrun = false;
         (self.mark, self.since_mark) = (0.0, 0);
     }
 
-    /// Resolves all events up to simulated time `end` (s), which lies in the current epoch.
+    /// Resolves all events up to simulated time `end` (s). When and how often it is called changes nothing of what happens.
     ///
     /// # Errors
     /// A broken invariant: grains that overlap, or a state that is no number.
@@ -135,17 +142,31 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         observer: &mut impl Observer,
         watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<ControlFlow<()>, Broken> {
-        while let Some((time, encounter)) = self.encounters.next_before(end - self.epoch_start) {
+        loop {
+            let epoch_end = self.epoch_start + self.epoch;
+            // The end of the epoch as it is known to `encounters`, free of the rounding of `epoch_end`.
+            let until = if end < epoch_end { end - self.epoch_start } else { self.epoch };
+            let Some((time, encounter)) = self.encounters.next_before(until) else {
+                if end <= epoch_end {
+                    break;
+                }
+                self.start_epoch(self.epoch);
+                continue;
+            };
             self.watch_for_jam(time, encounter)?;
             match encounter {
                 Encounter::Grains { a, b } => self.collide(time, a, b, observer)?,
                 Encounter::Surface { grain, element } => self.hit(time, grain, element, observer)?,
                 Encounter::Exit { grain } => self.take_out(Passage::Left, time, grain, observer),
             }
+            let now = self.epoch_start + time;
+            if self.outrun {
+                self.start_epoch(time);
+            }
             self.since_watch += 1;
             if self.since_watch == ENCOUNTERS_PER_WATCH {
                 self.since_watch = 0;
-                self.time = self.epoch_start + time;
+                self.time = now;
                 if watch(self.progress()).is_break() {
                     return Ok(ControlFlow::Break(()));
                 }
@@ -193,7 +214,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             let (fresh, other) = if self.grains[a as usize].hits == 0 { (a, b) } else { (b, a) };
             self.take_out(Passage::Removed, time, fresh, observer);
             let onwards = self.encounters.flight(other).velocity;
-            self.encounters.deflect(&[(other, onwards)]);
+            self.deflect(&[(other, onwards)]);
             return Ok(());
         }
         let contact = resolve_pair(&self.laws.grain, &first, &second, normal);
@@ -206,7 +227,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.check(time, &ids, overlap_over_radius, &[after_a.velocity, after_b.velocity])?;
         self.grains[a as usize].spin = after_a.spin;
         self.grains[b as usize].spin = after_b.spin;
-        self.encounters.deflect(&[(a, after_a.velocity), (b, after_b.velocity)]);
+        self.deflect(&[(a, after_a.velocity), (b, after_b.velocity)]);
         self.collisions += 1;
         observer.grain_collision(&GrainCollision {
             time: self.epoch_start + time,
@@ -248,7 +269,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         if matches!(self.laws.interference, Interference::FirstOrder | Interference::RemovedOnFirstCollision) {
             self.encounters.pass_through_surface(grain);
         }
-        self.encounters.deflect(&[(grain, resolved.after.velocity)]);
+        self.deflect(&[(grain, resolved.after.velocity)]);
         self.collisions += 1;
         let arriving = before.velocity - contact.velocity;
         let energy_normal = 0.5 * before.mass * arriving.dot(&contact.normal).powi(2);
@@ -273,13 +294,19 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         Ok(())
     }
 
+    #[inline]
+    fn deflect(&mut self, grains: &[(u32, Vector3<f64>)]) {
+        self.outrun |= grains.iter().any(|(_, velocity)| velocity.amax() > OUTRUN * self.fastest);
+        self.encounters.deflect(grains);
+    }
+
     fn take_out(&mut self, passage: Passage, time: f64, grain: u32, observer: &mut impl Observer) {
         let flight = *self.encounters.flight(grain);
         observer.passage(passage, self.epoch_start + time, &flight, &self.grains[grain as usize]);
         self.encounters.remove(grain);
     }
 
-    /// Takes a grain in at simulated time `time` (s), which lies in the current epoch and to which the run has been advanced.
+    /// Takes a grain in at simulated time `time` (s), to which the run has been advanced.
     pub fn enter(&mut self, time: f64, new: &NewGrain, observer: &mut impl Observer) {
         let flight = Flight { time: time - self.epoch_start, ..flight(new) };
         let grain = carried(new, self.entered);
@@ -291,10 +318,8 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             self.grains[slot] = grain;
         }
         observer.passage(Passage::Entered, time, &flight, &grain);
-        // A grain faster or smaller than those inside needs a finer time from now on.
-        if epoch_length(flight.radius, flight.velocity.norm(), self.epoch_start) < self.epoch {
-            self.epoch = flight.time;
-            self.start_epoch();
+        if flight.velocity.amax() > OUTRUN * self.fastest || OUTRUN * flight.radius < self.smallest {
+            self.start_epoch(flight.time);
         }
     }
 
@@ -303,7 +328,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.encounters.is_free(position, radius, time - self.epoch_start)
     }
 
-    /// Shows all grains at simulated time `time` (s), which lies in the current epoch.
+    /// Shows all grains at simulated time `time` (s), to which the run has been advanced.
     pub fn snapshot<R>(&self, time: f64, look: impl FnOnce(&Snapshot<'_>) -> R) -> R {
         let mut slots: Vec<u32> = self.encounters.inside().collect();
         slots.sort_unstable_by_key(|&slot| self.grains[slot as usize].id);
@@ -338,13 +363,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
 
 /// Length of an epoch that starts at simulated time `start` (s), for grains of this radius (m) and speed (m/s): a power of two.
 fn epoch_length(radius: f64, speed: f64, start: f64) -> f64 {
-    let power_of_two = |time: f64| 2f64.powi(time.log2().floor() as i32);
-    let wanted = EPOCH_RADII * radius / speed;
-    // Without grains, or with grains at rest, there is nothing to resolve; doubled each time, so that any end is reached.
-    let length =
-        if wanted.is_finite() { power_of_two(wanted) } else { IDLE_EPOCH.max(power_of_two(2.0 * start.abs())) };
-    // At least what moves simulated time on by more than its rounding.
-    length.max(power_of_two(start.abs() * LEAST_EPOCH))
+    let exponent = (EPOCH_RADII * radius / speed).log2().min(LONGEST_EPOCH);
+    let least = (start.abs() * LEAST_EPOCH).log2();
+    2f64.powi(exponent.max(least).floor() as i32)
 }
 
 #[cold]
