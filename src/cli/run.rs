@@ -78,7 +78,8 @@ fn report(error: &output::Error) -> Report {
     miette!(help = error.remedy(), "{error}")
 }
 
-/// A flag that Ctrl-C raises; the run stops at its next look. A second Ctrl-C does not wait for that.
+/// A flag that Ctrl-C raises, or the polite request of a batch system to end; the run stops at its next look. A second one does
+/// not wait for that.
 fn catch_interrupt() -> Result<Arc<AtomicBool>, Failure> {
     let flag = Arc::new(AtomicBool::new(false));
     let raised = Arc::clone(&flag);
