@@ -111,7 +111,6 @@ impl Simulation {
                         scheme.enter(time, &grain, observer);
                     }
                 }
-                Stop::Epoch => self.scheme.start_epoch(),
                 Stop::End => return Ok(Outcome { time, interrupted: false }),
             }
         }
@@ -131,12 +130,11 @@ impl Simulation {
 
     /// Whatever comes first; at equal times in the order in which they stand here, so that a sample at the end sees the end.
     fn next_stop(&self) -> (f64, Stop) {
-        let epoch = (self.scheme.epoch_end(), Stop::Epoch);
         let entries = self.nozzles.iter().enumerate();
         let entries = entries.filter_map(|(number, nozzle)| Some((nozzle.due()?, Stop::Entry(number))));
         let sample = self.samples.peek().map(|(_, time)| (time, Stop::Sample));
         let frame = self.frames.peek().map(|(number, time)| (time, Stop::Frame(number)));
-        let before_end = std::iter::once(epoch).chain(entries).chain(sample).chain(frame);
+        let before_end = entries.chain(sample).chain(frame);
         let end = (self.until, Stop::End);
         // Of equal times the first wins.
         before_end.chain([end]).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or(end)
@@ -156,7 +154,6 @@ enum Stop {
     Sample,
     Frame(u32),
     Entry(usize),
-    Epoch,
     End,
 }
 

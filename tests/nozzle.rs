@@ -65,7 +65,7 @@ fn fly(nozzle: &mut Nozzle, until: f64) -> Vec<NewGrain> {
 
 #[test]
 fn entries_are_never_more_than_one_off_the_flux() {
-    let nozzle = nozzle(ROOM, CIRCLE, "number-flux = 250.0", "start = 0.5");
+    let nozzle = nozzle(ROOM, CIRCLE, "number_flux = 250.0", "start = 0.5");
     let mut gaps = Vec::new();
     let mut last = 0.5;
     for (number, (time, _)) in entries(nozzle, 5000).into_iter().enumerate() {
@@ -81,15 +81,15 @@ fn entries_are_never_more_than_one_off_the_flux() {
 
 #[test]
 fn volume_fraction_gives_the_flux() {
-    let circle = nozzle(ROOM, CIRCLE, "volume-fraction = 0.05", "");
+    let circle = nozzle(ROOM, CIRCLE, "volume_fraction = 0.05", "");
     let expected = 0.05 * std::f64::consts::PI * 0.04 * 20.0 / sphere_volume(0.01);
     assert_relative_eq!(circle.flux(), expected, max_relative = 1e-14);
-    let slot = nozzle(ROOM, SLOT, "volume-fraction = 0.05", "");
+    let slot = nozzle(ROOM, SLOT, "volume_fraction = 0.05", "");
     assert_relative_eq!(slot.flux(), 0.05 * 0.12 * 20.0 / sphere_volume(0.01), max_relative = 1e-14);
-    let planar = nozzle(PLANAR, CIRCLE, "volume-fraction = 0.05", "");
+    let planar = nozzle(PLANAR, CIRCLE, "volume_fraction = 0.05", "");
     assert_relative_eq!(planar.flux(), 0.05 * 0.4 * 20.0 / (std::f64::consts::PI * 1e-4), max_relative = 1e-14);
     let drawn = "radius = { mean = 0.01, cv = 0.4, distribution = \"lognormal\" }";
-    let drawn = nozzle(ROOM, CIRCLE, "volume-fraction = 0.05", drawn);
+    let drawn = nozzle(ROOM, CIRCLE, "volume_fraction = 0.05", drawn);
     assert_relative_eq!(drawn.flux(), expected / 1.16f64.powi(3), max_relative = 1e-14);
     let volume: f64 = entries(drawn.clone(), 50_000).iter().map(|(_, grain)| sphere_volume(grain.radius)).sum();
     let rate = volume / 50_000.0 * drawn.flux();
@@ -98,7 +98,7 @@ fn volume_fraction_gives_the_flux() {
 
 #[test]
 fn a_circle_is_filled_evenly_and_diverges_from_its_axis() {
-    let nozzle = nozzle(ROOM, CIRCLE, "number-flux = 100.0", "divergence = 6.0\naxis = [1.0, 2.0, -2.0]");
+    let nozzle = nozzle(ROOM, CIRCLE, "number_flux = 100.0", "divergence = 6.0\naxis = [1.0, 2.0, -2.0]");
     let (centre, axis) = (Vector3::new(0.5, 0.0, 1.0), Vector3::new(1.0, 2.0, -2.0) / 3.0);
     let (mut sum, mut squares) = (Vector3::zeros(), 0.0);
     for (_, grain) in entries(nozzle, 20_000) {
@@ -119,7 +119,7 @@ fn a_circle_is_filled_evenly_and_diverges_from_its_axis() {
 
 #[test]
 fn a_slot_diverges_across_its_width_only() {
-    let nozzle = nozzle(ROOM, SLOT, "number-flux = 100.0", "divergence = 10.0");
+    let nozzle = nozzle(ROOM, SLOT, "number_flux = 100.0", "divergence = 10.0");
     let along = Vector3::new(1.0, 1.0, 0.0).normalize();
     let across = Vector3::new(1.0, -1.0, 0.0).normalize();
     let (mut widest, mut broadest) = (0.0f64, 0.0f64);
@@ -140,7 +140,7 @@ fn planar_nozzles_stay_in_the_plane_exactly() {
     for shape in [CIRCLE, SLOT] {
         let half = if shape == CIRCLE { 0.2 } else { 0.1 };
         let more = "divergence = 8.0\naxis = [1.0, 0.0, -1.0]\nspin = [0.0, 3.0, 0.0]";
-        for (_, grain) in entries(nozzle(PLANAR, shape, "number-flux = 100.0", more), 2000) {
+        for (_, grain) in entries(nozzle(PLANAR, shape, "number_flux = 100.0", more), 2000) {
             assert_eq!((grain.position.y.to_bits(), grain.velocity.y.to_bits()), (0, 0));
             let offset = grain.position - Vector3::new(0.5, 0.0, 1.0);
             assert!(offset.norm() <= half + 1e-15);
@@ -155,7 +155,7 @@ fn planar_nozzles_stay_in_the_plane_exactly() {
 #[test]
 fn a_dense_stream_keeps_its_flow_and_its_grains_apart() {
     for (domain, fraction) in [(ROOM, 0.1), (ROOM, 0.3), (PLANAR, 0.3)] {
-        let mut nozzle = nozzle(domain, CIRCLE, &format!("volume-fraction = {fraction}"), "");
+        let mut nozzle = nozzle(domain, CIRCLE, &format!("volume_fraction = {fraction}"), "");
         let until = 1500.0 / nozzle.flux();
         let grains = fly(&mut nozzle, until);
         assert_eq!(grains.len() as u64, nozzle.entered());
@@ -169,7 +169,7 @@ fn a_dense_stream_keeps_its_flow_and_its_grains_apart() {
 #[test]
 fn a_flow_that_finds_no_room_is_counted_and_ends() {
     // Feasible for a crystal, but not for grains that come in at random.
-    let mut nozzle = nozzle(ROOM, CIRCLE, "volume-fraction = 0.7", "");
+    let mut nozzle = nozzle(ROOM, CIRCLE, "volume_fraction = 0.7", "");
     let until = 4000.0 / nozzle.flux();
     let grains = fly(&mut nozzle, until);
     assert!(nozzle.deferred() > 500, "{}", nozzle.deferred());
@@ -180,7 +180,7 @@ fn a_flow_that_finds_no_room_is_counted_and_ends() {
 
 #[test]
 fn a_blocked_nozzle_defers_and_time_goes_on_then_the_backlog_drains() {
-    let mut nozzle = nozzle(ROOM, CIRCLE, "number-flux = 1e5", "stop = 1.0");
+    let mut nozzle = nozzle(ROOM, CIRCLE, "number_flux = 1e5", "stop = 1.0");
     let mut attempts = 0;
     let mut time = 0.0;
     while time < 0.1 {
@@ -209,7 +209,7 @@ fn a_blocked_nozzle_defers_and_time_goes_on_then_the_backlog_drains() {
 
 #[test]
 fn late_times_still_go_on() {
-    let mut nozzle = nozzle(ROOM, CIRCLE, "number-flux = 10.0", "start = 1e15\nradius = 1e-6");
+    let mut nozzle = nozzle(ROOM, CIRCLE, "number_flux = 10.0", "start = 1e15\nradius = 1e-6");
     let time = nozzle.due().unwrap();
     assert!(nozzle.enter(time, &mut |_, _| false).is_none());
     assert!(nozzle.due().unwrap() > time);
@@ -217,7 +217,7 @@ fn late_times_still_go_on() {
 
 #[test]
 fn stop_gives_the_number_that_was_asked_for() {
-    let mut nozzle = nozzle(ROOM, CIRCLE, "number-flux = 100.0", "start = 1.0\nstop = 3.0");
+    let mut nozzle = nozzle(ROOM, CIRCLE, "number_flux = 100.0", "start = 1.0\nstop = 3.0");
     while let Some(time) = nozzle.due() {
         assert!((1.0..3.0).contains(&time));
         nozzle.enter(time, &mut |_, _| true);
@@ -227,20 +227,20 @@ fn stop_gives_the_number_that_was_asked_for() {
 
 #[test]
 fn a_nozzle_does_not_make_up_for_the_time_before_the_run() {
-    let nozzle = nozzle(ROOM, CIRCLE, "number-flux = 100.0", "start = -5.0");
+    let nozzle = nozzle(ROOM, CIRCLE, "number_flux = 100.0", "start = -5.0");
     assert!(nozzle.due().unwrap() >= 0.0);
 }
 
 #[test]
 fn same_seed_same_stream() {
-    let of = || entries(nozzle(ROOM, CIRCLE, "number-flux = 10.0", "divergence = 1.0"), 100);
+    let of = || entries(nozzle(ROOM, CIRCLE, "number_flux = 10.0", "divergence = 1.0"), 100);
     assert_eq!(of(), of());
 }
 
 #[test]
 fn deferral_does_not_favour_small_grains() {
     let drawn = "radius = { mean = 0.01, cv = 0.5, distribution = \"uniform\" }";
-    let mut nozzle = nozzle(ROOM, CIRCLE, "volume-fraction = 0.25", drawn);
+    let mut nozzle = nozzle(ROOM, CIRCLE, "volume_fraction = 0.25", drawn);
     let until = 3000.0 / nozzle.flux();
     let grains = fly(&mut nozzle, until);
     assert!(nozzle.deferred() > 10, "the test must see deferrals: {}", nozzle.deferred());
@@ -250,14 +250,14 @@ fn deferral_does_not_favour_small_grains() {
 
 #[test]
 fn every_value_of_a_nozzle_is_checked() {
-    let flow = "number-flux = 10.0";
+    let flow = "number_flux = 10.0";
     for (domain, shape, flow, more, key, value) in [
         (ROOM, "shape = { circle = { diameter = 0.0 } }", flow, "", "source[0].shape.circle.diameter", "0"),
         (ROOM, "shape = { circle = { diameter = 20.0 } }", flow, "", "source[0].centre", "beyond the domain"),
-        (ROOM, CIRCLE, "number-flux = -1.0", "", "source[0].flow.number-flux", "-1"),
-        (ROOM, CIRCLE, "number-flux = 1e30", "", "source[0].flow.number-flux", "densest packing"),
-        (ROOM, CIRCLE, "volume-fraction = 0.9", "", "source[0].flow.volume-fraction", "0.9"),
-        (ROOM, CIRCLE, "volume-fraction = nan", "", "source[0].flow.volume-fraction", "NaN"),
+        (ROOM, CIRCLE, "number_flux = -1.0", "", "source[0].flow.number_flux", "-1"),
+        (ROOM, CIRCLE, "number_flux = 1e30", "", "source[0].flow.number_flux", "densest packing"),
+        (ROOM, CIRCLE, "volume_fraction = 0.9", "", "source[0].flow.volume_fraction", "0.9"),
+        (ROOM, CIRCLE, "volume_fraction = nan", "", "source[0].flow.volume_fraction", "NaN"),
         (ROOM, CIRCLE, flow, "axis = [0.0, 0.0, 0.0]", "source[0].axis", "has no direction"),
         (ROOM, CIRCLE, flow, "divergence = 90.0", "source[0].divergence", "90"),
         (ROOM, CIRCLE, flow, "divergence = -1.0", "source[0].divergence", "-1"),

@@ -19,6 +19,10 @@ impl Surface for Cushions {
         SurfaceContact { normal, gap, velocity: Vector3::zeros() }
     }
 
+    fn speed(&self) -> f64 {
+        0.0
+    }
+
     fn start_epoch(&mut self, _duration: f64) {}
 }
 

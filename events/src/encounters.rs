@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::calendar::{Calendar, Event, Kind, Tournament};
-use crate::contact_time::sphere_sphere;
+use crate::contact_time::sphere_sphere_until;
 use crate::neighbors::Cells;
 use crate::{Domain, Flight, NoSurface, Outlook, Surface};
 
@@ -33,6 +33,9 @@ pub enum Encounter {
 
 /// No partner.
 const NOBODY: u32 = u32::MAX;
+
+/// After so many crossings a grain the layout of the cells is thought over.
+const CROSSINGS_PER_GRAIN: usize = 8;
 
 /// The earliest of each sort of event that lies before a grain.
 #[derive(Clone, Copy, Debug)]
@@ -110,6 +113,10 @@ pub struct Encounters<S: Surface = NoSurface, C: Calendar = Tournament> {
     vacant: Vec<u32>,
     /// End of the epoch: nothing beyond it is scheduled.
     horizon: f64,
+    /// Cells crossed since their layout was last thought over.
+    crossings: usize,
+    /// Neighbours looked at since then.
+    looks: usize,
 }
 
 impl<S: Surface, C: Calendar> Encounters<S, C> {
@@ -120,7 +127,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     #[must_use]
     pub fn new(flights: Vec<Flight>, surface: S, domain: Domain) -> Self {
         let mut encounters = Self::without_pairs(flights, surface, domain);
-        encounters.lay_out_cells();
+        encounters.lay_out_cells(0.0);
         encounters.predict_all();
         encounters
     }
@@ -137,7 +144,18 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         let mut calendar = C::default();
         calendar.reserve(flights.len());
         let plans = vec![NO_PLAN; flights.len()];
-        Self { flights, plans, cells: None, calendar, surface, domain, vacant: Vec::new(), horizon: f64::INFINITY }
+        Self {
+            flights,
+            plans,
+            cells: None,
+            calendar,
+            surface,
+            domain,
+            vacant: Vec::new(),
+            horizon: f64::INFINITY,
+            crossings: 0,
+            looks: 0,
+        }
     }
 
     /// The state of a grain, at its own local time.
@@ -173,7 +191,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
                 return None;
             }
             match event.kind {
-                Kind::Crossing => self.cross(owner),
+                Kind::Crossing => self.cross(owner, event.time),
                 Kind::Review => {
                     self.plans[owner as usize].pair = never(Kind::Review);
                     self.find_partner(owner);
@@ -181,6 +199,8 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
                 }
                 Kind::Grains => {
                     let (a, b) = (owner.min(event.partner), owner.max(event.partner));
+                    self.plans[a as usize].pair = never(Kind::Review);
+                    self.plans[b as usize].pair = never(Kind::Review);
                     self.advance(a, event.time);
                     self.advance(b, event.time);
                     return Some((event.time, Encounter::Grains { a, b }));
@@ -225,12 +245,12 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         }
         match &mut self.cells {
             Some(cells) if !cells.fits(flight.radius) || cells.crowded(self.flights.len()) => {
-                self.lay_out_cells();
+                self.lay_out_cells(flight.time);
                 self.predict_all();
             }
             cells => {
                 if let Some(cells) = cells {
-                    cells.insert(grain, &flight);
+                    cells.insert(grain, &flight, flight.time);
                 }
                 self.predict(grain);
             }
@@ -286,20 +306,48 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             }
         }
         if self.cells.is_some() {
-            self.lay_out_cells();
+            self.lay_out_cells(0.0);
         }
         self.predict_all();
     }
 
-    fn lay_out_cells(&mut self) {
-        let inside = || self.flights.iter().filter(|flight| !is_vacant(flight));
-        let largest = inside().map(|flight| flight.radius).fold(0.0, f64::max);
-        let mut cells = Cells::new(self.domain, largest, inside());
+    /// Lays out the cells for the grains as they are at `now`.
+    fn lay_out_cells(&mut self, now: f64) {
+        let (flights, largest) = self.flights_and_largest_radius();
         assert!(self.domain.holds(largest), "the periodic domain is less than eight grain radii wide");
+        self.fill_cells(Cells::new(self.domain, largest, &flights, now), now);
+    }
+
+    fn fill_cells(&mut self, mut cells: Cells, now: f64) {
         for grain in self.inside() {
-            cells.insert(grain, self.flight(grain));
+            cells.insert(grain, self.flight(grain), now);
         }
         self.cells = Some(cells);
+        (self.crossings, self.looks) = (0, 0);
+    }
+
+    fn flights_and_largest_radius(&self) -> (Vec<Flight>, f64) {
+        let flights: Vec<Flight> = self.flights.iter().filter(|flight| !is_vacant(flight)).copied().collect();
+        let largest = flights.iter().map(|flight| flight.radius).fold(0.0, f64::max);
+        (flights, largest)
+    }
+
+    /// Lays out the cells anew if the stream has changed so much that it pays.
+    #[cold]
+    fn think_over_cells(&mut self, now: f64) {
+        let (flights, largest) = self.flights_and_largest_radius();
+        let Some(cells) = &self.cells else { return };
+        let Some(better) = cells.better(largest, &flights, now, self.crossings, self.looks) else {
+            (self.crossings, self.looks) = (0, 0);
+            return;
+        };
+        self.fill_cells(better, now);
+        for grain in self.inside().collect::<Vec<_>>() {
+            self.plans[grain as usize].crossing = self.crossing(grain);
+            self.look_at_surface(grain);
+            self.find_partner(grain);
+            self.reschedule(grain);
+        }
     }
 
     fn predict_all(&mut self) {
@@ -374,7 +422,8 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         let Some(cells) = &self.cells else { return };
         let mut search = self.search(grain);
         cells.visit_around(grain, |other, shift| search.consider(other, shift));
-        let best = search.best;
+        let (best, looks) = (search.best, search.looks);
+        self.looks += looks;
         self.plan_pair(grain, best);
     }
 
@@ -382,7 +431,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     fn search(&self, grain: u32) -> Search<'_> {
         let (flight, plan) = (self.flights[grain as usize], &self.plans[grain as usize]);
         let limit = plan.side.time.min(self.horizon);
-        Search { grain, flight, limit, flights: &self.flights, plans: &self.plans, best: plan.pair }
+        Search { grain, flight, limit, flights: &self.flights, plans: &self.plans, best: plan.pair, looks: 0 }
     }
 
     /// Puts a meeting into the plans of both grains, and leaves the one that `grain` or its new partner had in mind before.
@@ -408,8 +457,13 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         }
     }
 
-    /// Moves a grain into the next cell and looks at the neighbours that it has there.
-    fn cross(&mut self, grain: u32) {
+    /// Moves a grain into the next cell, at `now`, and looks at the neighbours that it has there.
+    fn cross(&mut self, grain: u32, now: f64) {
+        self.crossings += 1;
+        if self.crossings > CROSSINGS_PER_GRAIN * self.flights.len() {
+            // This crossing stays in the calendar, or is forgotten with the old cells.
+            return self.think_over_cells(now);
+        }
         let axis = self.plans[grain as usize].crossing.partner as u8;
         let mut best = self.plans[grain as usize].pair;
         if let Some(cells) = &mut self.cells {
@@ -447,6 +501,8 @@ struct Search<'a> {
     plans: &'a [Plan],
     /// The best so far.
     best: Event,
+    /// How many have been looked at.
+    looks: usize,
 }
 
 impl Search<'_> {
@@ -455,8 +511,10 @@ impl Search<'_> {
     /// What `other` has planned earlier will deflect it, and then it looks for itself; so does whoever it leaves.
     #[inline]
     fn consider(&mut self, other: u32, shift: Vector3<f64>) {
-        let Some(time) = sphere_sphere(&self.flight, &self.flights[other as usize], shift) else { return };
-        if time > self.best.time || time > self.limit {
+        self.looks += 1;
+        let until = self.best.time.min(self.limit);
+        let Some(time) = sphere_sphere_until(&self.flight, &self.flights[other as usize], shift, until) else { return };
+        if time > until {
             return;
         }
         let event = Event { time, kind: Kind::Grains, partner: other };

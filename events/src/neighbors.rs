@@ -22,6 +22,10 @@ const SLOTS_PER_GRAIN: usize = 4;
 /// fractions of 2^32 without a pattern (2^32 over the golden ratio, and over its square root) scatter the rows; along x cells
 /// stay side by side in memory.
 const STRIDES: Vector3<u32> = Vector3::new(1, 0x9E37_79B1, 0xC949_57E9);
+/// A crossing costs about as much as so many looks at a neighbour (instruction counts of the jet of 8000 grains).
+const LOOKS_PER_CROSSING: f64 = 6.0;
+/// A new layout costs a look around for every grain: it is taken when it cuts the cost to this fraction.
+const WORTH_A_NEW_LAYOUT: f64 = 0.8;
 const NOBODY: u32 = u32::MAX;
 
 /// Smallest length of a period for grains of this radius, m.
@@ -53,62 +57,116 @@ pub(crate) struct Crossing {
     pub(crate) axis: u8,
 }
 
-/// The grid.
+/// Size and motion of the grid.
 #[derive(Clone, Debug)]
-pub(crate) struct Cells {
+struct Layout {
+    /// Size of a cell, m.
     size: Vector3<f64>,
     /// Cells in a period along each axis; 0 where there is none.
     period: Vector3<i32>,
     /// Corner of cell (0, 0, 0) at epoch time 0, m.
     corner: Vector3<f64>,
+    /// Velocity, m/s.
     drift: Vector3<f64>,
+}
+
+/// The grid.
+#[derive(Clone, Debug)]
+pub(crate) struct Cells {
+    layout: Layout,
     domain: Domain,
     heads: Vec<u32>,
     places: Vec<Place>,
 }
 
-impl Cells {
-    /// An empty grid for grains of radius `largest_radius` at most, laid out for `flights`.
-    pub(crate) fn new<'a>(
-        domain: Domain,
-        largest_radius: f64,
-        flights: impl Iterator<Item = &'a Flight> + Clone,
-    ) -> Self {
-        let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
-        let (mut momentum, mut count) = (Vector3::zeros(), 0usize);
-        for flight in flights {
-            let start = flight.position_at(0.0);
-            (low, high) = (low.inf(&start), high.sup(&start));
-            momentum += flight.velocity;
-            count += 1;
-        }
-        if count == 0 {
-            (low, high) = (Vector3::zeros(), Vector3::zeros());
-        }
-        let slots = (SLOTS_PER_GRAIN * count).max(64).next_power_of_two();
-        let axes = domain.axes();
+impl Layout {
+    /// Cells of about `width` (m), and at least of the size of a contact, for `flights` as they are at `now` (s, epoch time).
+    ///
+    /// The grid drifts with the median velocity: that makes the fewest crossings.
+    fn new(domain: &Domain, largest_radius: f64, width: Option<f64>, flights: &[Flight], now: f64) -> Self {
         let contact = contact_width(largest_radius);
-        let drift = if domain.periodic || count == 0 { Vector3::zeros() } else { momentum / count as f64 };
-        if domain.periodic {
-            (low, high) = (domain.min, domain.max);
+        let axes = domain.axes();
+        let (mut corner, mut extent, mut drift) = (Vector3::zeros(), Vector3::repeat(contact), Vector3::zeros());
+        for &axis in axes {
+            if domain.periodic {
+                (corner[axis], extent[axis]) = (domain.min[axis], domain.max[axis] - domain.min[axis]);
+            } else if !flights.is_empty() {
+                let mut places: Vec<f64> = flights.iter().map(|flight| flight.position_at(now)[axis]).collect();
+                // A few grains that fly ahead do not count.
+                let [low, high] = [quantile(&mut places, 0.05), quantile(&mut places, 0.95)];
+                let mut velocities: Vec<f64> = flights.iter().map(|flight| flight.velocity[axis]).collect();
+                drift[axis] = quantile(&mut velocities, 0.5);
+                corner[axis] = low - drift[axis] * now;
+                extent[axis] = contact.max((high - low) / 0.9);
+            }
         }
-        let extent = |axis: usize| (high[axis] - low[axis]).max(contact);
-        // Cells of the size of a contact where grains are dense, larger ones where that would leave most of them empty.
-        let volume: f64 = axes.iter().map(|&axis| extent(axis)).product();
-        let width = contact.max((volume / slots as f64).powf(1.0 / axes.len() as f64));
+        let volume: f64 = axes.iter().map(|&axis| extent[axis]).product();
+        let one_in_each_slot = (volume / slots(flights.len()) as f64).powf(1.0 / axes.len() as f64);
+        let width = contact.max(width.unwrap_or(one_in_each_slot));
         let (mut size, mut period) = (Vector3::repeat(width), Vector3::zeros());
         if domain.periodic {
             for &axis in axes {
-                period[axis] = ((extent(axis) / width).floor() as i32).max(FEWEST_PERIODIC_CELLS);
-                size[axis] = extent(axis) / f64::from(period[axis]);
+                period[axis] = ((extent[axis] / width).floor() as i32).max(FEWEST_PERIODIC_CELLS);
+                size[axis] = extent[axis] / f64::from(period[axis]);
             }
         }
-        Self { size, period, corner: low, drift, domain, heads: vec![NOBODY; slots], places: Vec::new() }
+        Self { size, period, corner, drift }
+    }
+
+    /// How many cells `flights` cross in a second.
+    fn crossing_rate(&self, flights: &[Flight]) -> f64 {
+        flights.iter().map(|flight| (flight.velocity - self.drift).component_div(&self.size).lp_norm(1)).sum()
+    }
+}
+
+/// The value below which a fraction `part` of `values` lies.
+fn quantile(values: &mut [f64], part: f64) -> f64 {
+    let rank = ((values.len() - 1) as f64 * part) as usize;
+    *values.select_nth_unstable_by(rank, f64::total_cmp).1
+}
+
+/// How many slots so many grains get.
+fn slots(grains: usize) -> usize {
+    (SLOTS_PER_GRAIN * grains).max(64).next_power_of_two()
+}
+
+impl Cells {
+    /// An empty grid for grains of radius `largest_radius` at most, laid out for `flights` as they are at `now` (s, epoch time).
+    pub(crate) fn new(domain: Domain, largest_radius: f64, flights: &[Flight], now: f64) -> Self {
+        let layout = Layout::new(&domain, largest_radius, None, flights, now);
+        Self::empty(domain, layout, flights.len())
+    }
+
+    fn empty(domain: Domain, layout: Layout, grains: usize) -> Self {
+        Self { layout, domain, heads: vec![NOBODY; slots(grains)], places: Vec::new() }
+    }
+
+    /// An empty grid that suits `flights` better, if it is worth its cost; `crossings` and `looks` are what this one took lately.
+    ///
+    /// Cells x times as wide are crossed 1/x times as often and hold x³ times as many grains to look at. The sum of both costs is
+    /// least where x⁴ = cost of the crossings / (3 cost of the looks); in a planar scene x³ with 2.
+    pub(crate) fn better(
+        &self,
+        largest_radius: f64,
+        flights: &[Flight],
+        now: f64,
+        crossings: usize,
+        looks: usize,
+    ) -> Option<Self> {
+        let dimensions = self.domain.axes().len() as f64;
+        let (crossing, looking) = (LOOKS_PER_CROSSING * crossings as f64, looks.max(1) as f64);
+        let wider = (crossing / (dimensions * looking)).powf(1.0 / (dimensions + 1.0)).clamp(0.5, 2.0);
+        let width = self.layout.size.x * wider;
+        let layout = Layout::new(&self.domain, largest_radius, Some(width), flights, now);
+        let fewer = layout.crossing_rate(flights) / self.layout.crossing_rate(flights);
+        let more = (layout.size.x / self.layout.size.x).powf(dimensions);
+        let worth_it = fewer * crossing + more * looking < WORTH_A_NEW_LAYOUT * (crossing + looking);
+        worth_it.then(|| Self::empty(self.domain, layout, flights.len()))
     }
 
     /// Whether grains of this radius fit the cells.
     pub(crate) fn fits(&self, radius: f64) -> bool {
-        self.domain.axes().iter().all(|&axis| contact_width(radius) <= self.size[axis])
+        self.domain.axes().iter().all(|&axis| contact_width(radius) <= self.layout.size[axis])
     }
 
     /// Whether so many grains would crowd the slots.
@@ -118,11 +176,11 @@ impl Cells {
 
     /// Position relative to the corner of the grid, in the frame that drifts with it.
     fn relative(&self, position: Vector3<f64>, time: f64) -> Vector3<f64> {
-        position - (self.corner + self.drift * time)
+        position - (self.layout.corner + self.layout.drift * time)
     }
 
     fn cell_of(&self, position: Vector3<f64>, time: f64) -> Vector3<i32> {
-        let mut cell = self.relative(position, time).component_div(&self.size).map(|x| x.floor() as i32);
+        let mut cell = self.relative(position, time).component_div(&self.layout.size).map(|x| x.floor() as i32);
         if self.domain.planar {
             cell.y = 0;
         }
@@ -132,7 +190,7 @@ impl Cells {
     /// Coordinate along `axis` of the cell in the period that stands for `cell`.
     #[inline]
     fn home(&self, cell: Vector3<i32>, axis: usize) -> i32 {
-        if self.period[axis] == 0 { cell[axis] } else { cell[axis].rem_euclid(self.period[axis]) }
+        if self.layout.period[axis] == 0 { cell[axis] } else { cell[axis].rem_euclid(self.layout.period[axis]) }
     }
 
     /// The slot of a cell in the period.
@@ -146,12 +204,12 @@ impl Cells {
         self.slot(Vector3::from_fn(|axis, _| self.home(cell, axis)))
     }
 
-    /// Puts grain `id` into the cell where it is at its local time.
-    pub(crate) fn insert(&mut self, id: u32, flight: &Flight) {
+    /// Puts grain `id` into the cell where it is at `now` (s, epoch time).
+    pub(crate) fn insert(&mut self, id: u32, flight: &Flight, now: f64) {
         if self.places.len() <= id as usize {
             self.places.resize(id as usize + 1, NOWHERE);
         }
-        self.places[id as usize].cell = self.cell_of(flight.position, flight.time);
+        self.places[id as usize].cell = self.cell_of(flight.position_at(now), now);
         self.link(id);
     }
 
@@ -181,18 +239,18 @@ impl Cells {
     /// Tells the grid that a periodic wrap has moved the stored position of `id` by `shift`.
     pub(crate) fn wrapped(&mut self, id: u32, shift: Vector3<f64>) {
         let periods = shift.component_div(&self.domain.extent()).map(|x| x.round() as i32);
-        self.places[id as usize].cell += periods.component_mul(&self.period);
+        self.places[id as usize].cell += periods.component_mul(&self.layout.period);
     }
 
     /// When and through which side `flight` leaves its cell.
     pub(crate) fn crossing(&self, id: u32, flight: &Flight) -> Crossing {
         let cell = self.places[id as usize].cell;
         let y = self.relative(flight.position, flight.time);
-        let v = flight.velocity - self.drift;
+        let v = flight.velocity - self.layout.drift;
         let mut first = Crossing { time: f64::INFINITY, axis: 0 };
         for &axis in self.domain.axes() {
             if v[axis] != 0.0 {
-                let side = f64::from(cell[axis] + i32::from(v[axis] > 0.0)) * self.size[axis];
+                let side = f64::from(cell[axis] + i32::from(v[axis] > 0.0)) * self.layout.size[axis];
                 let time = flight.time + (side - y[axis]) / v[axis];
                 if time < first.time {
                     first = Crossing { time, axis: axis as u8 };
@@ -205,7 +263,7 @@ impl Cells {
     /// Moves grain `id` into the next cell along `axis` and tells which way it went.
     pub(crate) fn cross(&mut self, id: u32, flight: &Flight, axis: u8) -> i32 {
         let axis = usize::from(axis);
-        let step = if flight.velocity[axis] > self.drift[axis] { 1 } else { -1 };
+        let step = if flight.velocity[axis] > self.layout.drift[axis] { 1 } else { -1 };
         self.remove(id);
         self.places[id as usize].cell[axis] += step;
         self.link(id);
@@ -283,7 +341,7 @@ impl Cells {
         }
         let mut shift = Vector3::zeros();
         for &axis in self.domain.axes() {
-            let (steps, period) = (cell[axis] - stored[axis], self.period[axis]);
+            let (steps, period) = (cell[axis] - stored[axis], self.layout.period[axis]);
             if steps % period != 0 {
                 return None;
             }

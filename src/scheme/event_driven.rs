@@ -15,6 +15,11 @@ use crate::scene::Interference;
 ///
 /// Within an epoch a time is known to 2^-53 of the epoch, so a position to 4096 × 2^-53 = 5e-13 radii.
 const EPOCH_RADII: f64 = 4096.0;
+/// A grain that becomes so many times as fast as the fastest was, or enters so many times as small as the smallest, ends the epoch early:
+/// resolution is lost by no more than this factor.
+const OUTRUN: f64 = 8.0;
+/// Length of an epoch in which nothing moves, as a power of two, s.
+const LONGEST_EPOCH: f64 = 1000.0;
 /// Overlap at an event, over the smaller radius, above which a run is wrong and stops. Rounding leaves about 1e-13.
 pub const LARGEST_OVERLAP: f64 = 1e-9;
 /// A run is jammed when so many encounters a grain, and [`JAM_ENCOUNTERS`] more, happen while time goes on by less than
@@ -48,6 +53,12 @@ pub struct EventDriven<S: Surface, C: Calendar = Tournament> {
     epoch_start: f64,
     /// Length of the epoch, s: a power of two, so that `epoch_start` stays exact.
     epoch: f64,
+    /// Largest speed (along any axis) at the start of the epoch, m/s.
+    fastest: f64,
+    /// Smallest radius at the start of the epoch, m; infinity where there were no grains.
+    smallest: f64,
+    /// Whether a grain has become too fast for the epoch.
+    outrun: bool,
     /// Simulated time that has been reached, s.
     time: f64,
     entered: u64,
@@ -76,6 +87,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             domain,
             epoch_start: start,
             epoch: 0.0,
+            fastest: 0.0,
+            smallest: f64::INFINITY,
+            outrun: false,
             time: start,
             entered,
             collisions: 0,
@@ -83,7 +97,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             since_mark: 0,
             mark: 0.0,
         };
-        scheme.start_epoch();
+        scheme.start_epoch(0.0);
         scheme
     }
 
@@ -99,30 +113,25 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.encounters.surface()
     }
 
-    /// Simulated time at the end of the current epoch, s.
-    pub fn epoch_end(&self) -> f64 {
-        self.epoch_start + self.epoch
-    }
-
-    /// Starts the next epoch at the end of the current one, and chooses its length by the fastest grain.
-    pub fn start_epoch(&mut self) {
-        let mut fastest = 0f64;
-        let mut smallest = f64::INFINITY;
+    /// Starts an epoch `after` seconds into the current one, and chooses its length by the fastest and the smallest grain.
+    fn start_epoch(&mut self, after: f64) {
+        self.fastest = self.encounters.surface().speed();
+        self.smallest = f64::INFINITY;
         for grain in self.encounters.inside() {
             let flight = self.encounters.flight(grain);
-            fastest = fastest.max(flight.velocity.norm());
-            smallest = smallest.min(flight.radius);
+            self.fastest = self.fastest.max(flight.velocity.amax());
+            self.smallest = self.smallest.min(flight.radius);
         }
-        let wanted = EPOCH_RADII * smallest / fastest;
-        // Without grains, or with grains at rest, there is nothing to resolve.
-        let next = if wanted.is_finite() { 2f64.powi(wanted.log2().floor() as i32) } else { 2f64.powi(20) };
-        self.encounters.start_epoch(self.epoch, next);
-        self.epoch_start += self.epoch;
+        let wanted = EPOCH_RADII * self.smallest / self.fastest;
+        let next = 2f64.powi(wanted.log2().floor().min(LONGEST_EPOCH) as i32);
+        self.encounters.start_epoch(after, next);
+        self.epoch_start += after;
         self.epoch = next;
+        self.outrun = false;
         (self.mark, self.since_mark) = (0.0, 0);
     }
 
-    /// Resolves all events up to simulated time `end` (s), which lies in the current epoch.
+    /// Resolves all events up to simulated time `end` (s). When and how often it is called changes nothing of what happens.
     ///
     /// # Errors
     /// A broken invariant: grains that overlap, or a state that is no number.
@@ -132,17 +141,31 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         observer: &mut impl Observer,
         watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<ControlFlow<()>, Broken> {
-        while let Some((time, encounter)) = self.encounters.next_before(end - self.epoch_start) {
+        loop {
+            let epoch_end = self.epoch_start + self.epoch;
+            // The end of the epoch as it is known to `encounters`, free of the rounding of `epoch_end`.
+            let until = if end < epoch_end { end - self.epoch_start } else { self.epoch };
+            let Some((time, encounter)) = self.encounters.next_before(until) else {
+                if end <= epoch_end {
+                    break;
+                }
+                self.start_epoch(self.epoch);
+                continue;
+            };
             self.watch_for_jam(time, encounter)?;
             match encounter {
                 Encounter::Grains { a, b } => self.collide(time, a, b, observer)?,
                 Encounter::Surface { grain, element } => self.hit(time, grain, element, observer)?,
                 Encounter::Exit { grain } => self.take_out(Passage::Left, time, grain, observer),
             }
+            let now = self.epoch_start + time;
+            if self.outrun {
+                self.start_epoch(time);
+            }
             self.since_watch += 1;
             if self.since_watch == ENCOUNTERS_PER_WATCH {
                 self.since_watch = 0;
-                self.time = self.epoch_start + time;
+                self.time = now;
                 if watch(self.progress()).is_break() {
                     return Ok(ControlFlow::Break(()));
                 }
@@ -190,7 +213,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             let (fresh, other) = if self.grains[a as usize].hits == 0 { (a, b) } else { (b, a) };
             self.take_out(Passage::Removed, time, fresh, observer);
             let onwards = self.encounters.flight(other).velocity;
-            self.encounters.deflect(&[(other, onwards)]);
+            self.deflect(&[(other, onwards)]);
             return Ok(());
         }
         let contact = resolve_pair(&self.laws.grain, &first, &second, normal);
@@ -203,7 +226,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.check(time, &ids, overlap_over_radius, &[after_a.velocity, after_b.velocity])?;
         self.grains[a as usize].spin = after_a.spin;
         self.grains[b as usize].spin = after_b.spin;
-        self.encounters.deflect(&[(a, after_a.velocity), (b, after_b.velocity)]);
+        self.deflect(&[(a, after_a.velocity), (b, after_b.velocity)]);
         self.collisions += 1;
         observer.grain_collision(&GrainCollision {
             time: self.epoch_start + time,
@@ -239,7 +262,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         if matches!(self.laws.interference, Interference::FirstOrder | Interference::RemovedOnFirstCollision) {
             self.encounters.pass_through_surface(grain);
         }
-        self.encounters.deflect(&[(grain, resolved.after.velocity)]);
+        self.deflect(&[(grain, resolved.after.velocity)]);
         self.collisions += 1;
         let arriving = before.velocity - contact.velocity;
         let energy_normal = 0.5 * before.mass * arriving.dot(&contact.normal).powi(2);
@@ -264,13 +287,19 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         Ok(())
     }
 
+    #[inline]
+    fn deflect(&mut self, grains: &[(u32, Vector3<f64>)]) {
+        self.outrun |= grains.iter().any(|(_, velocity)| velocity.amax() > OUTRUN * self.fastest);
+        self.encounters.deflect(grains);
+    }
+
     fn take_out(&mut self, passage: Passage, time: f64, grain: u32, observer: &mut impl Observer) {
         let flight = *self.encounters.flight(grain);
         observer.passage(passage, self.epoch_start + time, &flight, &self.grains[grain as usize]);
         self.encounters.remove(grain);
     }
 
-    /// Takes a grain in at simulated time `time` (s), which lies in the current epoch and to which the run has been advanced.
+    /// Takes a grain in at simulated time `time` (s), to which the run has been advanced.
     pub fn enter(&mut self, time: f64, new: &NewGrain, observer: &mut impl Observer) {
         let flight = Flight { time: time - self.epoch_start, ..flight(new) };
         let grain = carried(new, self.entered);
@@ -282,6 +311,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             self.grains[slot] = grain;
         }
         observer.passage(Passage::Entered, time, &flight, &grain);
+        if flight.velocity.amax() > OUTRUN * self.fastest || OUTRUN * flight.radius < self.smallest {
+            self.start_epoch(flight.time);
+        }
     }
 
     /// Whether a grain of this radius fits in at `position` at simulated time `time` (s).
@@ -289,7 +321,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.encounters.is_free(position, radius, time - self.epoch_start)
     }
 
-    /// Shows all grains at simulated time `time` (s), which lies in the current epoch.
+    /// Shows all grains at simulated time `time` (s), to which the run has been advanced.
     pub fn snapshot<R>(&self, time: f64, look: impl FnOnce(&Snapshot<'_>) -> R) -> R {
         let mut slots: Vec<u32> = self.encounters.inside().collect();
         slots.sort_unstable_by_key(|&slot| self.grains[slot as usize].id);

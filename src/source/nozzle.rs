@@ -172,12 +172,12 @@ fn flux(flow: Flow, opening: &Opening, speed: f64, radii: &Radii, context: &Cont
     let grain = if planar { PI * radii.mean_square() } else { sphere_volume(1.0) * radii.mean_cube() };
     let (key, given, flux) = match flow {
         Flow::VolumeFraction(fraction) => {
-            let key = context.key("flow.volume-fraction");
+            let key = context.key("flow.volume_fraction");
             let fraction = value::positive(&key, fraction)?;
             (key, fraction, fraction * opening.area(0.0) * speed / grain)
         }
         Flow::NumberFlux(flux) => {
-            let key = context.key("flow.number-flux");
+            let key = context.key("flow.number_flux");
             let flux = value::positive(&key, flux)?;
             (key, flux, flux)
         }

@@ -164,6 +164,10 @@ impl impinge_events::Surface for Surface {
         SurfaceContact { normal, gap, velocity: part.velocity }
     }
 
+    fn speed(&self) -> f64 {
+        self.parts.iter().map(|part| part.velocity.amax()).fold(0.0, f64::max)
+    }
+
     fn start_epoch(&mut self, duration: f64) {
         for part in &mut self.parts {
             part.offset += part.velocity * duration;

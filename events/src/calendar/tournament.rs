@@ -12,35 +12,37 @@ struct Entry {
 }
 
 /// An owner without an event never wins.
-const ABSENT: Entry = Entry { time: f64::INFINITY, owner: u32::MAX };
+const ABSENT: Entry = Entry { time: f64::INFINITY, owner: NOBODY };
+const NOBODY: u32 = u32::MAX;
 const NO_EVENT: Event = Event { time: f64::INFINITY, kind: Kind::Exit, partner: u32::MAX };
 
-/// A calendar as a complete binary tree: the leaves are the owners, each inner node holds the earlier of its two children.
+/// A calendar as a complete binary tree of matches, each between two players; the winner plays in the next match.
 ///
-/// To reschedule an owner replays its matches on the way to the root and stops at the first whose winner stays the same,
+/// To reschedule an owner replays its matches on the way to the final and stops at the first that somebody else wins as before,
 /// which for most events is one of the first few.
 #[derive(Clone, Debug, Default)]
 pub struct Tournament {
-    /// Node 1 is the root, node k has the children 2k and 2k + 1, owner i is the leaf `leaves` + i.
-    nodes: Vec<Entry>,
-    leaves: usize,
+    /// The winner of match k plays on side k % 2 of match k / 2. Match 1 is the final; its winner stands in match 0. The owners 2k
+    /// and 2k + 1 meet first, in match `first_round` + k.
+    matches: Vec<[Entry; 2]>,
+    first_round: usize,
     events: Vec<Event>,
 }
 
 /// The winner of a match.
 #[inline]
-fn earlier(left: Entry, right: Entry, events: &[Event]) -> Entry {
+fn winner([left, right]: [Entry; 2], events: &[Event]) -> Entry {
     if left.time < right.time {
         left
     } else if right.time < left.time {
         right
     } else {
-        earlier_of_simultaneous(left, right, events)
+        winner_of_simultaneous(left, right, events)
     }
 }
 
 #[cold]
-fn earlier_of_simultaneous(left: Entry, right: Entry, events: &[Event]) -> Entry {
+fn winner_of_simultaneous(left: Entry, right: Entry, events: &[Event]) -> Entry {
     let event = |entry: Entry| events.get(entry.owner as usize).unwrap_or(&NO_EVENT);
     match event(left).order(left.owner, event(right), right.owner) {
         Ordering::Greater => right,
@@ -52,39 +54,39 @@ impl Tournament {
     /// Replays the matches of `owner`.
     #[inline]
     fn replay(&mut self, owner: u32, entry: Entry) {
-        let Self { nodes, events, leaves } = self;
-        let nodes = nodes.as_mut_slice();
-        let mut node = *leaves + owner as usize;
-        let mut winner = entry;
-        nodes[node] = winner;
-        while node > 1 {
-            winner = earlier(winner, nodes[node ^ 1], events);
-            node /= 2;
-            // The same owner at the same time may be another event, and stand elsewhere among simultaneous ones.
-            if winner.owner != owner && nodes[node] == winner {
+        let Self { matches, events, first_round } = self;
+        let (mut number, mut side) = (*first_round + owner as usize / 2, owner as usize % 2);
+        let mut player = entry;
+        loop {
+            let match_ = &mut matches[number];
+            // The same owner at the same time may have another event, and stand elsewhere among simultaneous ones.
+            if player.owner != owner && match_[side] == player {
                 break;
             }
-            nodes[node] = winner;
+            match_[side] = player;
+            if number == 0 {
+                break;
+            }
+            player = winner(*match_, events);
+            (number, side) = (number / 2, number % 2);
         }
     }
 }
 
 impl Calendar for Tournament {
     fn reserve(&mut self, owners: usize) {
-        if owners <= self.leaves {
+        if owners <= 2 * self.first_round {
             return;
         }
-        self.leaves = owners.next_power_of_two();
-        self.events.resize(self.leaves, NO_EVENT);
-        self.nodes.clear();
-        self.nodes.resize(2 * self.leaves, ABSENT);
+        self.first_round = owners.next_power_of_two().max(2) / 2;
+        self.events.resize(2 * self.first_round, NO_EVENT);
+        self.matches.clear();
+        self.matches.resize(2 * self.first_round, [ABSENT; 2]);
         for (owner, event) in (0..).zip(&self.events) {
-            if event.time < f64::INFINITY {
-                self.nodes[self.leaves + owner as usize] = Entry { time: event.time, owner };
-            }
+            self.matches[self.first_round + owner as usize / 2][owner as usize % 2] = entry(owner, event);
         }
-        for node in (1..self.leaves).rev() {
-            self.nodes[node] = earlier(self.nodes[2 * node], self.nodes[2 * node + 1], &self.events);
+        for number in (1..2 * self.first_round).rev() {
+            self.matches[number / 2][number % 2] = winner(self.matches[number], &self.events);
         }
     }
 
@@ -94,8 +96,7 @@ impl Calendar for Tournament {
             self.reserve(owner as usize + 1);
         }
         self.events[owner as usize] = event;
-        let entry = if event.time < f64::INFINITY { Entry { time: event.time, owner } } else { ABSENT };
-        self.replay(owner, entry);
+        self.replay(owner, entry(owner, &event));
     }
 
     fn cancel(&mut self, owner: u32) {
@@ -107,9 +108,15 @@ impl Calendar for Tournament {
 
     #[inline]
     fn next(&self) -> Option<(u32, Event)> {
-        let first = *self.nodes.get(1)?;
-        (first.owner != u32::MAX).then(|| (first.owner, self.events[first.owner as usize]))
+        let first = self.matches.first()?[1];
+        (first.owner != NOBODY).then(|| (first.owner, self.events[first.owner as usize]))
     }
+}
+
+/// An owner as a player; one whose event never comes does not play.
+#[inline]
+fn entry(owner: u32, event: &Event) -> Entry {
+    if event.time < f64::INFINITY { Entry { time: event.time, owner } } else { ABSENT }
 }
 
 #[cfg(test)]

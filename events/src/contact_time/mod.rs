@@ -5,7 +5,7 @@ mod sphere_sphere;
 mod sphere_triangle;
 
 pub use sphere_plane::sphere_plane;
-pub use sphere_sphere::sphere_sphere;
+pub use sphere_sphere::{sphere_sphere, sphere_sphere_until};
 pub use sphere_triangle::{Edge, Face, Sweep, sphere_corner, sphere_triangle};
 
 /// Approach speeds below this fraction of the speeds they are the difference of are rounding, not approach.
@@ -15,3 +15,10 @@ pub use sphere_triangle::{Edge, Face, Sweep, sphere_corner, sphere_triangle};
 /// (restitution 0, or a collapsed sequence of hits); to resolve such a contact again would never end. Consequence: in
 /// the time in which they move by a thousand radii they can sink into each other by at most 2e-12 radii.
 pub const APPROACH_ROUNDING: f64 = 1.0 / (1u64 << 49) as f64;
+
+/// Speeds below this (m/s) are rest.
+///
+/// Near the smallest number that a float can hold (5e-324) restitution rounds to 1 and a collapsed sequence of hits would go on for
+/// ever; this is far enough above it that every approach that [`APPROACH_ROUNDING`] lets pass still has all its digits.
+/// Consequence: in 1e270 s a grain at rest could have moved by 1e-10 m.
+pub const STANDSTILL: f64 = 1e-280;

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::APPROACH_ROUNDING;
+use super::{APPROACH_ROUNDING, STANDSTILL};
 use crate::Flight;
 
 /// Time (s, epoch time) at which `flight` touches the one-sided plane through `point` with unit normal `normal`, or `None`
@@ -24,8 +24,9 @@ use crate::Flight;
 #[must_use]
 pub fn sphere_plane(flight: &Flight, point: Vector3<f64>, normal: Vector3<f64>) -> Option<f64> {
     let approach = -flight.velocity.dot(&normal);
+    let fastest = flight.velocity.amax();
     // The comparison is false for NaN, so a degenerate normal never gives a time.
-    if approach > APPROACH_ROUNDING * flight.velocity.amax() {
+    if approach > APPROACH_ROUNDING * fastest && fastest >= STANDSTILL {
         let gap = (flight.position - point).dot(&normal) - flight.radius;
         Some(flight.time + (gap / approach).max(0.0))
     } else {

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::APPROACH_ROUNDING;
+use super::{APPROACH_ROUNDING, STANDSTILL};
 use crate::Flight;
 
 /// Time (s, epoch time) at which the spheres `a` and `b` touch, or `None` when they never do.
@@ -29,6 +29,14 @@ use crate::Flight;
 #[inline]
 #[must_use]
 pub fn sphere_sphere(a: &Flight, b: &Flight, shift: Vector3<f64>) -> Option<f64> {
+    sphere_sphere_until(a, b, shift, f64::INFINITY)
+}
+
+/// As [`sphere_sphere`], for callers that care only for contacts until `until` (s, epoch time): a pair that touches later may be
+/// passed over. The time of a contact does not depend on `until`.
+#[inline]
+#[must_use]
+pub fn sphere_sphere_until(a: &Flight, b: &Flight, shift: Vector3<f64>, until: f64) -> Option<f64> {
     let v = b.velocity - a.velocity;
     // Whoever is at the later time is where its state says.
     let (base, r) = if a.time >= b.time {
@@ -39,6 +47,12 @@ pub fn sphere_sphere(a: &Flight, b: &Flight, shift: Vector3<f64>) -> Option<f64>
     let r = r + shift;
     let approach = -r.dot(&v);
     if approach > 0.0 {
+        let s = a.radius + b.radius;
+        // r² - s² falls by less than 2 b t within t.
+        let separation = r.norm_squared() - s * s;
+        if separation > 2.0 * approach * (until - base) * (1.0 + CAUTION) + CAUTION * s * s {
+            return None;
+        }
         let v2 = v.norm_squared();
         if v2 >= SMALLEST_SPEED_SQUARED {
             return meeting(a, b, r, v, approach, v2).map(|interval| base + interval);
@@ -47,6 +61,9 @@ pub fn sphere_sphere(a: &Flight, b: &Flight, shift: Vector3<f64>) -> Option<f64>
     }
     None
 }
+
+/// What rounding may do to a bound, relative: much more than it does, and too little to let many pairs pass.
+const CAUTION: f64 = 1e-9;
 
 /// Below this relative speed squared ((1e-140 m/s)²) the products of the root would underflow.
 const SMALLEST_SPEED_SQUARED: f64 = 1e-280;
@@ -72,7 +89,10 @@ fn meeting(a: &Flight, b: &Flight, r: Vector3<f64>, v: Vector3<f64>, approach: f
 #[cold]
 fn slow_meeting(a: &Flight, b: &Flight, r: Vector3<f64>, v: Vector3<f64>) -> Option<f64> {
     let fastest = a.velocity.amax().max(b.velocity.amax());
-    let unit = 2f64.powi(fastest.log2().floor().clamp(-960.0, 0.0) as i32);
+    if fastest < STANDSTILL {
+        return None;
+    }
+    let unit = 2f64.powi(fastest.log2().floor().min(0.0) as i32);
     let scaled = |flight: &Flight| Flight { velocity: flight.velocity / unit, ..*flight };
     let v = v / unit;
     meeting(&scaled(a), &scaled(b), r, v, -r.dot(&v), v.norm_squared()).map(|interval| interval / unit)

@@ -12,7 +12,7 @@
 
 use nalgebra::Vector3;
 
-use super::APPROACH_ROUNDING;
+use super::{APPROACH_ROUNDING, STANDSTILL};
 use crate::Flight;
 
 /// How far outside its border (in units of the distances that the foot point was reckoned from) a face or the length of an
@@ -87,7 +87,7 @@ impl Sweep {
             velocity: flight.velocity * unit,
             radius: flight.radius,
             speed: speed * unit,
-            slowest: APPROACH_ROUNDING * speeds * unit,
+            slowest: if speed < STANDSTILL { f64::INFINITY } else { APPROACH_ROUNDING * speeds * unit },
             start: flight.time,
             unit,
         }
