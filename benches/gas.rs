@@ -8,7 +8,7 @@ mod support;
 use std::f64::consts::PI;
 use std::time::{Duration, Instant};
 
-use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, criterion_group, criterion_main};
 use impinge::grains::NewGrain;
 use impinge::law::{ContactLaw, Friction};
 use impinge::scene::{Interference, Scene};
@@ -53,8 +53,8 @@ impl<C: Calendar> Gas<C> {
         start.elapsed().mul_f64(iterations as f64 / collisions as f64)
     }
 
-    fn bench(&mut self, c: &mut Criterion, calendar: &str, parameters: &str) {
-        c.bench_function(BenchmarkId::new(format!("gas collision/{calendar}"), parameters), |b| {
+    fn bench(&mut self, c: &mut Criterion, gas: &str, calendar: &str) {
+        c.bench_function(&format!("{gas}/{calendar}"), |b| {
             b.iter_custom(|iterations| self.time_of(iterations));
         });
     }
@@ -114,15 +114,18 @@ fn gas(c: &mut Criterion) {
             // The two runs are equal bit for bit, so each round is the same work for both.
             let share = (2 * fast.grains) as f64;
             let outcome = duel(rounds, || fast.collide(share), || plain.collide(share));
-            let parameters = format!("{} grains, volume fraction {fraction}", fast.grains);
-            fast.bench(c, "fast", &parameters);
-            plain.bench(c, "plain", &parameters);
-            table.push((parameters, outcome));
+            let name = format!("gas of {} grains, volume fraction {fraction}", fast.grains);
+            fast.bench(c, &name, "fast");
+            plain.bench(c, &name, "plain");
+            table.push((name, outcome));
         }
     }
-    eprintln!("\nCPU time per collision       fast calendar  plain calendar  plain/fast");
-    for (parameters, Duel { microseconds: [fast, plain], ratio, .. }) in table {
-        eprintln!("{parameters:36} {fast:6.3} µs       {plain:6.3} µs   {ratio:9.2}");
+    eprintln!(
+        "\n{:38} {:>13} {:>14} {:>11}",
+        "CPU time per collision", "fast calendar", "plain calendar", "plain/fast"
+    );
+    for (name, Duel { microseconds: [fast, plain], ratio, .. }) in table {
+        eprintln!("{name:38} {fast:10.3} µs {plain:11.3} µs {ratio:11.2}");
     }
 }
 

@@ -13,7 +13,7 @@ use impinge::scheme::{EventDriven, Laws};
 use impinge::source;
 use impinge::surface::Surface;
 use impinge_events::calendar::{Calendar, PlainCalendar, Tournament};
-use impinge_events::{Domain, Flight, Outlook, Surface as _, SurfaceContact};
+use impinge_events::{Domain, Flight, Outlook, SurfaceContact};
 use support::{Duel, advance, duel, trial};
 
 /// End of the run, s.
@@ -73,6 +73,10 @@ impl impinge_events::Surface for Shared<'_> {
         self.0.contact(element, flight)
     }
 
+    fn speed(&self) -> f64 {
+        0.0
+    }
+
     fn start_epoch(&mut self, _duration: f64) {}
 }
 
@@ -102,9 +106,12 @@ fn jets(c: &mut Criterion) {
             table.push((format!("jet of {count}, {} triangles", mesh.elements()), duel(rounds, fast, on_mesh)));
         }
     }
-    eprintln!("\nCPU time per grain-grain collision     collisions  fast calendar, plane       this  this/fast");
-    for (what, Duel { microseconds: [fast, this], ratio, collisions }) in table {
-        eprintln!("{what:38} {collisions:10} {fast:18.3} µs {this:10.3} µs {ratio:10.2}");
+    eprintln!(
+        "\n{:38} {:>10} {:>12} {:>12} {:>10}",
+        "CPU time per grain-grain collision", "collisions", "fast, plane", "this", "this/fast"
+    );
+    for (name, Duel { microseconds: [fast, this], ratio, collisions }) in table {
+        eprintln!("{name:38} {collisions:10} {fast:9.3} µs {this:9.3} µs {ratio:10.2}");
     }
 }
 
