@@ -9,6 +9,8 @@ use impinge::scheme::{EventDriven, GrainCollision, Observer};
 use impinge_events::NoSurface;
 use nalgebra::Vector3;
 
+/// What some thousand grains instead of infinitely many may change, relative: of the order of 1 / N.
+const FINITE: f64 = 5e-4;
 /// Contact distance of the grains of [`gas`], m; their mass is 1 kg.
 const S: f64 = 1.0;
 
@@ -85,11 +87,24 @@ fn elastic(cells: u32, phi: f64, collisions: f64) -> [(f64, f64); 3] {
     [mean(&rates), mean(&zs), (drift.abs() / (sums.collisions as f64).sqrt(), 0.0)]
 }
 
-/// Rate within 1 %, Z within 0.5 %, and both known well enough for that: three standard errors are less.
+/// Compressibility of Carnahan, Starling & Kolafa (Boublík & Nezbeda 1986), which is 0.3 % above Carnahan & Starling at phi = 0.3 and nearer
+/// to the truth.
+fn z_kolafa(phi: f64) -> f64 {
+    (1.0 + phi + phi.powi(2) - 2.0 / 3.0 * phi.powi(3) * (1.0 + phi)) / (1.0 - phi).powi(3)
+}
+
+/// Rate within 1 % and Z within 0.5 % of Carnahan & Starling, both known well enough for that (three standard errors are less), and within
+/// three standard errors of Carnahan, Starling & Kolafa, give or take [`FINITE`].
 fn assert_carnahan_starling(cells: u32, phi: f64, collisions: f64) {
     let [rate, z, drift] = elastic(cells, phi, collisions);
-    println!("phi = {phi}: rate {rate:?}, Z {z:?}, drift {:e}", drift.0);
-    for (what, (ratio, error), tolerance) in [("rate", rate, 0.01), ("Z", z, 0.005)] {
+    eprintln!("phi = {phi}: rate {rate:?}, Z {z:?}, drift {:e}", drift.0);
+    let z_simple = 1.0 + 4.0 * phi * chi(phi);
+    let better = [(z_kolafa(phi) - 1.0) / (z_simple - 1.0), z_kolafa(phi) / z_simple];
+    for ((what, (ratio, error), tolerance), better) in [("rate", rate, 0.01), ("Z", z, 0.005)].into_iter().zip(better) {
+        assert!(
+            (ratio - better).abs() < 3.0 * error + FINITE,
+            "phi = {phi}: {what} is {ratio} ± {error}, not {better}"
+        );
         assert!((ratio - 1.0).abs() < tolerance, "phi = {phi}: {what} is {ratio} ± {error} of theory");
         assert!(3.0 * error < tolerance, "phi = {phi}: {what} is known to {error} only");
     }
@@ -104,6 +119,10 @@ fn elastic_gas_agrees_with_carnahan_and_starling() {
     }
 }
 
+/// Found (rate and Z over those of Carnahan & Starling, energy drift over √(collisions)):
+/// phi = 0.1:  1.00070 ± 0.00011, 1.00022 ± 0.00004, 2.6e-16 (Kolafa: 1.00070, 1.00024);
+/// phi = 0.3:  1.00356 ± 0.00013, 1.00266 ± 0.00011, 2.6e-16 (Kolafa: 1.00355, 1.00264);
+/// phi = 0.49: 1.00139 ± 0.00028, 1.00122 ± 0.00025, 2.6e-16 (Kolafa: 1.00053, 1.00049).
 #[test]
 #[ignore = "about 5 minutes: cargo test --release --test gas -- --ignored --nocapture"]
 fn elastic_gas_agrees_with_carnahan_and_starling_over_1e8_collisions() {
@@ -138,14 +157,14 @@ fn cool(e: f64, phi: f64, seed: u64) -> (f64, f64, f64) {
 }
 
 /// Hard case 17: dT/ds = -(1 - e²) T / 3 with s collisions per grain, times N / (N - 1) where the total momentum is zero. Between the first
-/// and the last collision the gaps in time grow by 1e6; nothing underflows.
+/// and the last collision the gaps in time grow by 1e6; nothing underflows. Found: slope 0.993 ± 0.001 of it, as the velocities are not
+/// quite Maxwell's.
 #[test]
 fn haff_cooling_over_twelve_decades() {
     let (e, n) = (0.9f64, 216.0);
     let runs: Vec<_> = (0..8).map(|seed| cool(e, 0.1, seed)).collect();
     let slopes: Vec<f64> = runs.iter().map(|(ln, s, _)| ln / s / (-(1.0 - e * e) / 3.0 * n / (n - 1.0))).collect();
     let counts: Vec<f64> = runs.iter().map(|(_, s, expected)| s / expected).collect();
-    println!("slope {:?}, count {:?}", mean(&slopes), mean(&counts));
     assert!((mean(&slopes).0 - 1.0).abs() < 0.02, "{:?} of Haff's slope", mean(&slopes));
     assert!((mean(&counts).0 - 1.0).abs() < 0.02, "{:?} of the collisions expected", mean(&counts));
     assert!(3.0 * mean(&slopes).1 < 0.02 && 3.0 * mean(&counts).1 < 0.02);

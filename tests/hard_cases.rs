@@ -238,7 +238,7 @@ fn case_12_overlaps_do_not_grow() {
 }
 
 #[test]
-#[ignore = "about 10 minutes: cargo test --release --test hard_cases -- --ignored case_12"]
+#[ignore = "about 20 minutes: cargo test --release --test hard_cases -- --ignored case_12"]
 fn case_12_overlaps_do_not_grow_in_a_billion_events() {
     let [first, second] = overlaps_in_a_gas(1_000_000_000);
     assert!(first < 1e-11 && second < 1e-11, "{first:e}, {second:e}");

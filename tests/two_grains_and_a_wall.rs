@@ -8,10 +8,12 @@
 mod common;
 
 use std::f64::consts::PI;
+use std::slice;
 
 use common::{FLOOR, Hit, Log, grain, kinetic_energy, run, smooth, states};
-use impinge::scene::Interference;
+use impinge::scene::{self, Interference};
 use impinge::scheme::{EventDriven, Laws};
+use impinge::surface::Surface;
 use impinge_events::Domain;
 use impinge_events::contact_time::STANDSTILL;
 use nalgebra::Vector3;
@@ -453,4 +455,31 @@ fn collapse_did_not_end_at_subnormal_speeds() {
     let played = play(&sequence);
     assert_eq!(played.energy, 0.0);
     assert!(played.last.iter().all(|v| v.abs() < STANDSTILL), "{:?}", played.last);
+}
+
+/// So too on a wall of triangles.
+#[test]
+fn collapse_on_a_mesh_ends_at_rest() {
+    let wall = scene::Surface::Rectangle(scene::RectangleSurface {
+        centre: [0.1, 0.2, 0.0],
+        normal: [0.0, 0.0, 1.0],
+        along: [1.0, 0.0, 0.0],
+        size: [3.0, 3.0],
+        divisions: [1, 1],
+        velocity: [0.0; 3],
+    });
+    for sequence in [equal(0.15), Sequence { m2: 4.0, ..equal(0.3) }] {
+        let surface = Surface::new(slice::from_ref(&wall), ".".as_ref()).expect("a rectangle");
+        let grains = [0.8, 2.0]
+            .into_iter()
+            .zip([sequence.m1, sequence.m2])
+            .map(|(z, mass)| grain(Vector3::z() * z, Vector3::z() * -V0, 0.5, mass))
+            .collect::<Vec<_>>();
+        let mut scheme: EventDriven<_> = EventDriven::new(&grains, surface, Domain::unbounded(), laws(&sequence), 0.0);
+        let mut log = Log::default();
+        run(&mut scheme, 1e4, &mut log).expect("no broken invariant");
+        let e0 = 0.5 * (sequence.m1 + sequence.m2);
+        assert!(kinetic_energy(&states(&scheme, 1e4)) < 1e-28 * e0, "{sequence:?}");
+        assert!((surface_energy(&log) / e0 - sequence.surface_energy()).abs() < 1e-14, "{sequence:?}");
+    }
 }

@@ -46,3 +46,8 @@ pub use encounters::{Encounter, Encounters};
 pub use flight::Flight;
 pub use mesh::{BadTriangle, Mesh};
 pub use surface::{NoSurface, Outlook, Surface, SurfaceContact};
+
+/// The program in README.md runs too.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -42,8 +42,11 @@ pub trait Surface {
     /// The contact between `element` and a flight that has been advanced to the moment of contact.
     fn contact(&self, element: u32, flight: &Flight) -> SurfaceContact;
 
-    /// The largest speed of any part of it along an axis, m/s.
-    fn speed(&self) -> f64;
+    /// The largest speed of any part of it along an axis, m/s; a surface that moves must say so, or times late in an epoch in which all
+    /// grains rest are coarse.
+    fn speed(&self) -> f64 {
+        0.0
+    }
 
     /// Starts a new epoch `duration` seconds later: moving parts go on by their velocity, times count from there.
     fn start_epoch(&mut self, duration: f64);
@@ -60,10 +63,6 @@ impl Surface for NoSurface {
 
     fn contact(&self, element: u32, _flight: &Flight) -> SurfaceContact {
         unreachable!("there is no element {element} where there is no surface")
-    }
-
-    fn speed(&self) -> f64 {
-        0.0
     }
 
     fn start_epoch(&mut self, _duration: f64) {}

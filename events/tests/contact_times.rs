@@ -5,74 +5,16 @@
 //! than a few units in the last place of the distances involved, and a contact that only one of the two finds passes when it
 //! is gone, or there, in a sphere that is larger or smaller by that much.
 
-use std::ops::{Add, Mul, Sub};
+mod exact;
 
-use dashu_float::{FBig, round::mode::HalfEven};
+use exact::{Exact, Real, double, earlier_root, exact_meeting, real};
 use impinge_events::Flight;
 use impinge_events::contact_time::{sphere_plane, sphere_sphere, sphere_triangle};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
-type Real = FBig<HalfEven, 2>;
-
-/// About 66 digits.
-const BITS: usize = 220;
-
 /// Units in the last place (2^-53) of the distances involved that a contact may be off.
 const UNITS: f64 = 100.0 / (1u64 << 53) as f64;
-
-fn real(value: f64) -> Real {
-    Real::try_from(value).expect("a finite number").with_precision(BITS).value()
-}
-
-fn double(value: &Real) -> f64 {
-    value.to_f64().value()
-}
-
-#[derive(Clone)]
-struct Exact([Real; 3]);
-
-impl Exact {
-    fn of(vector: Vector3<f64>) -> Self {
-        Self([real(vector.x), real(vector.y), real(vector.z)])
-    }
-
-    fn dot(&self, other: &Self) -> Real {
-        (0..3).map(|i| &self.0[i] * &other.0[i]).fold(real(0.0), |sum, term| sum + term)
-    }
-
-    fn cross(&self, other: &Self) -> Self {
-        let part = |i: usize, j: usize| &self.0[i] * &other.0[j] - &self.0[j] * &other.0[i];
-        Self([part(1, 2), part(2, 0), part(0, 1)])
-    }
-}
-
-impl Add for &Exact {
-    type Output = Exact;
-    fn add(self, other: Self) -> Exact {
-        Exact([0, 1, 2].map(|i| &self.0[i] + &other.0[i]))
-    }
-}
-
-impl Sub for &Exact {
-    type Output = Exact;
-    fn sub(self, other: Self) -> Exact {
-        Exact([0, 1, 2].map(|i| &self.0[i] - &other.0[i]))
-    }
-}
-
-impl Mul<&Real> for &Exact {
-    type Output = Exact;
-    fn mul(self, factor: &Real) -> Exact {
-        Exact([0, 1, 2].map(|i| &self.0[i] * factor))
-    }
-}
-
-/// The earlier root of a t² + 2 b t + c with b < 0 < c.
-fn earlier_root(a: &Real, b: &Real, c: &Real) -> Option<Real> {
-    let reach = b * b - a * c;
-    (*b < real(0.0) && reach >= real(0.0)).then(|| c / (reach.sqrt() - b))
-}
 
 /// First contact of a sphere that starts clear of the triangle: interval and speed of arrival.
 fn exact_contact(flight: &Flight, corners: [Vector3<f64>; 3], radius: &Real) -> Option<(Real, Real)> {
@@ -248,12 +190,6 @@ proptest! {
             None => prop_assert!(double(&approach) <= UNITS * velocity.norm()),
         }
     }
-}
-
-/// When two spheres touch that are `r` apart, move with `v` against each other and whose radii add up to `reach`; a negative one
-/// never touches.
-fn exact_meeting(r: &Exact, v: &Exact, reach: &Real) -> Option<Real> {
-    if *reach < real(0.0) { None } else { earlier_root(&v.dot(v), &r.dot(v), &(r.dot(r) - reach * reach)) }
 }
 
 proptest! {

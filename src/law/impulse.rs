@@ -128,7 +128,7 @@ pub fn resolve_surface(
 #[inline]
 fn contact(law: &ContactLaw, mass: f64, relative: Vector3<f64>, normal: Vector3<f64>) -> (Impulse, f64) {
     let approach = -relative.dot(&normal);
-    if !(approach > 0.0) {
+    if approach <= 0.0 || approach.is_nan() {
         return (Impulse { normal: 0.0, tangential: Vector3::zeros(), dissipated: 0.0 }, approach);
     }
     let e = law.restitution;
