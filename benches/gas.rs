@@ -121,11 +121,11 @@ fn gas(c: &mut Criterion) {
         }
     }
     eprintln!(
-        "\n{:38} {:>13} {:>14} {:>11}",
+        "\n{:42} {:>13} {:>14} {:>11}",
         "CPU time per collision", "fast calendar", "plain calendar", "plain/fast"
     );
     for (name, Duel { microseconds: [fast, plain], ratio, .. }) in table {
-        eprintln!("{name:38} {fast:10.3} µs {plain:11.3} µs {ratio:11.2}");
+        eprintln!("{name:42} {fast:10.3} µs {plain:11.3} µs {ratio:11.2}");
     }
 }
 

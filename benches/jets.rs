@@ -107,11 +107,11 @@ fn jets(c: &mut Criterion) {
         }
     }
     eprintln!(
-        "\n{:38} {:>10} {:>12} {:>12} {:>10}",
+        "\n{:42} {:>10} {:>12} {:>12} {:>10}",
         "CPU time per grain-grain collision", "collisions", "fast, plane", "this", "this/fast"
     );
     for (name, Duel { microseconds: [fast, this], ratio, collisions }) in table {
-        eprintln!("{name:38} {collisions:10} {fast:9.3} µs {this:9.3} µs {ratio:10.2}");
+        eprintln!("{name:42} {collisions:10} {fast:9.3} µs {this:9.3} µs {ratio:10.2}");
     }
 }
 
