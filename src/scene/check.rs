@@ -11,6 +11,11 @@ const GRAINS_MAX: u64 = 100_000_000;
 /// Most rows of the time history and most frames: each frame is a file, each row a look at all grains.
 const ROWS_MAX: u32 = 10_000_000;
 
+/// Largest magnitude of a number of the scene, its times apart, and smallest radius, density or width, in SI units. Energies and
+/// discriminants are products of several such numbers and must be numbers too; nothing that grains do is anywhere near.
+pub(crate) const LARGEST: f64 = 1e30;
+pub(crate) const SMALLEST: f64 = 1e-30;
+
 type Checked = Result<(), Invalid>;
 
 /// Validates all of a scene that belongs to no single source or surface.
@@ -71,6 +76,11 @@ fn all_finite(value: &Value, path: &str) -> Checked {
             path,
             format!("{number} is no finite number"),
             "give a finite number, or leave the key out",
+        )),
+        Value::Float(number) if number.abs() > LARGEST && !path.starts_with("run.") => Err(Invalid::new(
+            path,
+            format!("{number:e} is too large to compute with"),
+            format!("give a number of magnitude {LARGEST:e} at most, in SI units"),
         )),
         Value::Table(table) => table.iter().try_for_each(|(name, value)| match path {
             "" => all_finite(value, name),
@@ -243,10 +253,14 @@ fn in_plane(key: &str, vector: Vec3) -> Checked {
 }
 
 fn positive(key: &str, value: f64, unit: &str) -> Checked {
-    if value > 0.0 {
-        return Ok(());
+    if value <= 0.0 {
+        return Err(Invalid::new(key, format!("{value} {unit} is not above 0"), "give a number above 0"));
     }
-    Err(Invalid::new(key, format!("{value} {unit} is not above 0"), "give a number above 0"))
+    if value < SMALLEST {
+        let what = format!("{value:e} {unit} is too small to compute with");
+        return Err(Invalid::new(key, what, format!("give {SMALLEST:e} {unit} or more")));
+    }
+    Ok(())
 }
 
 fn not_negative(key: &str, value: f64) -> Checked {

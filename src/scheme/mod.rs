@@ -26,7 +26,7 @@ pub struct Progress {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Broken {
     /// Grains overlap each other or the surface by more than rounding can explain.
-    #[error("at t = {time} s {} by {overlap:.3e} radii (allowed: {LARGEST_OVERLAP:.0e})", overlapping(grains))]
+    #[error("at t = {time:e} s {} by {overlap:.3e} radii (allowed: {LARGEST_OVERLAP:.0e})", overlapping(grains))]
     Overlap {
         /// Simulated time, s.
         time: f64,
@@ -36,7 +36,7 @@ pub enum Broken {
         overlap: f64,
     },
     /// Collisions without end, while time stands still.
-    #[error("at t = {time} s grain {} is jammed: {encounters} collisions and no time goes by", list(grains))]
+    #[error("at t = {time:e} s {} jammed: {encounters} collisions and no time goes by", are(grains))]
     Jammed {
         /// Simulated time, s.
         time: f64,
@@ -46,7 +46,7 @@ pub enum Broken {
         encounters: u64,
     },
     /// The surface pushes a grain of a planar scene out of its plane.
-    #[error("at t = {time} s the surface would push grain {grain} of a planar scene out of the plane y = 0")]
+    #[error("at t = {time:e} s the surface would push grain {grain} of a planar scene out of the plane y = 0")]
     OutOfPlane {
         /// Simulated time, s.
         time: f64,
@@ -54,7 +54,7 @@ pub enum Broken {
         grain: u64,
     },
     /// A velocity is no finite number.
-    #[error("at t = {time} s the velocity of grain {} is no finite number", list(grains))]
+    #[error("at t = {time:e} s the velocity of grain {} is no finite number", list(grains))]
     NotANumber {
         /// Simulated time, s.
         time: f64,
@@ -67,6 +67,13 @@ fn overlapping(grains: &[u64]) -> String {
     match grains {
         [grain] => format!("grain {grain} overlaps the surface"),
         _ => format!("grains {} overlap", list(grains)),
+    }
+}
+
+fn are(grains: &[u64]) -> String {
+    match grains {
+        [grain] => format!("grain {grain} is"),
+        _ => format!("grains {} are", list(grains)),
     }
 }
 

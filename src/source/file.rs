@@ -15,7 +15,7 @@ use rand_pcg::Pcg64Mcg;
 use super::context::Context;
 use super::radius::Radii;
 use crate::grains::NewGrain;
-use crate::scene::{FileSource, Invalid};
+use crate::scene::{FileSource, Invalid, LARGEST, SMALLEST};
 
 /// All columns; the first `NEEDED` must be there.
 const COLUMNS: [&str; 11] = ["x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz", "radius", "density"];
@@ -152,6 +152,10 @@ impl Table {
         match text.parse::<f64>() {
             Err(_) => refuse("is not a number", "write a number such as 0.25 or -1.5e-3"),
             Ok(value) if !value.is_finite() => refuse("is not finite", "give a finite number"),
+            Ok(value) if value.abs() > LARGEST => refuse("is too large to compute with", "give it in SI units"),
+            Ok(value) if column >= RADIUS && value > 0.0 && value < SMALLEST => {
+                refuse("is too small to compute with", "give it in SI units")
+            }
             Ok(value) if column >= RADIUS && value <= 0.0 => {
                 refuse("is not larger than 0", "give a number larger than 0")
             }

@@ -1,0 +1,108 @@
+//! The command as a script or a shell sees it: what stands on standard output, and what an interrupted run leaves.
+
+#![cfg(unix)]
+
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+fn impinge() -> Command {
+    Command::new(assert_cmd::cargo::cargo_bin("impinge"))
+}
+
+/// A run that would take minutes, caught in the middle: its partial folder is there and has a frame.
+fn started(results: &Path) -> Child {
+    let mut command = impinge();
+    command.args(["run", "examples/gas.toml", "--until", "600", "--set", "run.frames=100000", "-o"]).arg(results);
+    let mut run = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
+    let home = results.parent().expect("it is in a folder");
+    let began = Instant::now();
+    loop {
+        let folders = fs::read_dir(home).expect("it is there").map(|entry| entry.expect("readable").path());
+        if folders.into_iter().any(|folder| folder.join("frames/grains_0002.vtp").exists()) {
+            return run;
+        }
+        assert!(run.try_wait().expect("it is ours").is_none(), "the run ended by itself");
+        assert!(began.elapsed() < Duration::from_secs(60), "no frame appears");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+fn signal(run: &Child, name: &str) {
+    let sent = Command::new("kill").args(["-s", name, &run.id().to_string()]).status().expect("there is a `kill`");
+    assert!(sent.success());
+}
+
+#[test]
+fn an_interrupted_run_is_finished_and_says_so() {
+    for name in ["INT", "TERM"] {
+        let home = tempfile::tempdir().expect("a folder");
+        let results = home.path().join("gas");
+        let run = started(&results);
+        signal(&run, name);
+        let output = run.wait_with_output().expect("it ends");
+        assert_eq!(output.status.code(), Some(130), "{name}: {}", String::from_utf8_lossy(&output.stderr));
+        let text = String::from_utf8(output.stdout).expect("UTF-8");
+        assert!(text.contains(" stopped at ") && text.contains("written to "), "{text}");
+        assert!(output.stderr.is_empty(), "nothing but results when nobody watches");
+
+        let json = fs::read(results.join("summary.json")).expect("it is there");
+        let summary: serde_json::Value = serde_json::from_slice(&json).expect("JSON");
+        let reached = summary["time"]["reached"].as_f64().expect("a number");
+        assert_eq!(summary["interrupted"], true);
+        assert!(0.0 < reached && reached < 600.0);
+        assert!(summary["energy"]["residual_relative"].as_f64().expect("a number").abs() < 1e-12);
+        let series = fs::read_to_string(results.join("series.csv")).expect("it is there");
+        let last = series.lines().last().and_then(|row| row.split(',').next()).expect("a row");
+        assert_eq!(last.parse(), Ok(reached));
+        assert_eq!(fs::read_dir(home.path()).expect("it is there").count(), 1, "nothing else is left");
+    }
+}
+
+#[test]
+fn a_killed_run_leaves_earlier_results_alone() {
+    let home = tempfile::tempdir().expect("a folder");
+    let results = home.path().join("gas");
+    fs::create_dir(&results).expect("it is made");
+    fs::write(results.join("summary.json"), "of another run").expect("it is written");
+    let mut run = impinge()
+        .args(["run", "examples/gas.toml", "--until", "600", "--force", "-o"])
+        .arg(&results)
+        .stdout(Stdio::null())
+        .spawn()
+        .expect("it starts");
+    std::thread::sleep(Duration::from_millis(300));
+    signal(&run, "KILL");
+    assert!(!run.wait().expect("it ends").success());
+    assert_eq!(fs::read_to_string(results.join("summary.json")).expect("it is there"), "of another run");
+}
+
+#[test]
+fn a_reader_that_stops_reading_is_no_failure() {
+    let home = tempfile::tempdir().expect("a folder");
+    let mut command = impinge();
+    command.args(["run", "examples/two_grains.toml", "-o"]).arg(home.path().join("two")).stdout(Stdio::piped());
+    let mut run = command.spawn().expect("it starts");
+    let mut first = String::new();
+    BufReader::new(run.stdout.take().expect("a pipe")).read_line(&mut first).expect("a line");
+    assert!(first.starts_with("Two grains and a wall"), "{first}");
+    assert!(run.wait().expect("it ends").success());
+}
+
+#[test]
+fn what_impinge_check_prints_of_every_example() {
+    for (scene, expected) in [
+        ("erosive_jet", &["block: 8000 grains", "volume fraction 0.335", "mean free path 0.00703 m", "4.8 MB"][..]),
+        ("two_grains", &["file grains_two.csv: 2 grains", "restitution 0.5, smooth"]),
+        ("gas", &["lattice: 2048 grains", "about 85000 collisions", "volume fraction 0.2\n"]),
+        ("nozzle", &["nozzle: 1315 grains", "volume fraction 0.02\n", "64 open edges"]),
+        ("mesh_target", &["7552 triangles", "watertight", "block: 3000 grains"]),
+    ] {
+        let output = impinge().args(["check", &format!("examples/{scene}.toml")]).output().expect("it runs");
+        let text = String::from_utf8(output.stdout).expect("UTF-8");
+        assert!(output.status.success() && text.contains(": valid"), "{scene}: {text}");
+        expected.iter().for_each(|part| assert!(text.contains(part), "{scene} without {part:?}:\n{text}"));
+    }
+}
