@@ -457,6 +457,16 @@ fn collapse_did_not_end_at_subnormal_speeds() {
     assert!(played.last.iter().all(|v| v.abs() < STANDSTILL), "{:?}", played.last);
 }
 
+/// A grain a thousand times as heavy as the inner one needs more than a million hits to come to rest.
+#[test]
+fn a_long_collapse_was_told_as_a_jam() {
+    let sequence = Sequence { m2: 1000.0, ..equal(0.05) };
+    assert!(sequence.collapses());
+    let mut scheme = scheme(&sequence, [0.5, 0.5], laws(&sequence));
+    run(&mut scheme, 1000.0, &mut ()).expect("no jam");
+    assert!(kinetic_energy(&states(&scheme, 1000.0)) < 1e-12 * 0.5 * (sequence.m1 + sequence.m2));
+}
+
 /// So too on a wall of triangles.
 #[test]
 fn collapse_on_a_mesh_ends_at_rest() {

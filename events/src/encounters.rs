@@ -430,8 +430,8 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     #[inline]
     fn search(&self, grain: u32) -> Search<'_> {
         let (flight, plan) = (self.flights[grain as usize], &self.plans[grain as usize]);
-        let limit = plan.side.time.min(self.horizon);
-        Search { grain, flight, limit, flights: &self.flights, plans: &self.plans, best: plan.pair, looks: 0 }
+        let until = plan.pair.time.min(plan.side.time).min(self.horizon);
+        Search { grain, flight, until, flights: &self.flights, plans: &self.plans, best: plan.pair, looks: 0 }
     }
 
     /// Puts a meeting into the plans of both grains, and leaves the one that `grain` or its new partner had in mind before.
@@ -495,8 +495,8 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
 struct Search<'a> {
     grain: u32,
     flight: Flight,
-    /// When something else than a grain stops the search, s.
-    limit: f64,
+    /// Later meetings do not count, s.
+    until: f64,
     flights: &'a [Flight],
     plans: &'a [Plan],
     /// The best so far.
@@ -512,9 +512,9 @@ impl Search<'_> {
     #[inline]
     fn consider(&mut self, other: u32, shift: Vector3<f64>) {
         self.looks += 1;
-        let until = self.best.time.min(self.limit);
-        let Some(time) = sphere_sphere_until(&self.flight, &self.flights[other as usize], shift, until) else { return };
-        if time > until {
+        let theirs = &self.flights[other as usize];
+        let Some(time) = sphere_sphere_until(&self.flight, theirs, shift, self.until) else { return };
+        if time > self.until {
             return;
         }
         let event = Event { time, kind: Kind::Grains, partner: other };
@@ -524,7 +524,7 @@ impl Search<'_> {
             && event.is_before(self.grain, &theirs.pair, other)
             && time <= theirs.side.time
         {
-            self.best = event;
+            (self.best, self.until) = (event, time);
         }
     }
 }

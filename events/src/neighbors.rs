@@ -23,9 +23,9 @@ const SLOTS_PER_GRAIN: usize = 4;
 /// stay side by side in memory.
 const STRIDES: Vector3<u32> = Vector3::new(1, 0x9E37_79B1, 0xC949_57E9);
 /// A crossing costs about as much as so many looks at a neighbour (instruction counts of the jet of 8000 grains).
-const LOOKS_PER_CROSSING: f64 = 6.0;
+const LOOKS_PER_CROSSING: f64 = 10.0;
 /// A new layout costs a look around for every grain: it is taken when it cuts the cost to this fraction.
-const WORTH_A_NEW_LAYOUT: f64 = 0.8;
+const WORTH_A_NEW_LAYOUT: f64 = 0.9;
 const NOBODY: u32 = u32::MAX;
 
 /// Smallest side (m) that a periodic domain may have for grains of this radius (m): eight radii and a little, or the image that a

@@ -30,6 +30,8 @@ pub const LARGEST_OVERLAP: f64 = 1e-9;
 const JAM_ENCOUNTERS_PER_GRAIN: u64 = 1000;
 const JAM_ENCOUNTERS: u64 = 1_000_000;
 const JAM_TIME: f64 = 1.0 / (1u64 << 20) as f64;
+/// Speed over that of the fastest grain below which a sequence of hits has collapsed.
+const COLLAPSED: f64 = 1e-9;
 /// Encounters between two looks at the watch (progress, Ctrl-C).
 const ENCOUNTERS_PER_WATCH: u32 = 4096;
 
@@ -187,6 +189,12 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
                 Encounter::Grains { a, b } => vec![a, b],
                 Encounter::Surface { grain, .. } | Encounter::Exit { grain } => vec![grain],
             };
+            // A collapse of very unequal grains takes as many hits, but all but stands still: it ends by itself.
+            let speed = |&slot: &u32| self.encounters.flight(slot).velocity.amax();
+            if slots.iter().map(speed).fold(0.0, f64::max) < COLLAPSED * self.fastest {
+                self.since_mark = 0;
+                return Ok(());
+            }
             let grains = slots.iter().map(|&slot| self.grains[slot as usize].id).collect();
             return Err(Broken::Jammed { time: self.epoch_start + time, grains, encounters: self.since_mark });
         }
