@@ -8,6 +8,7 @@ use std::time::Instant;
 
 use cpu_time::ProcessTime;
 use impinge::output::{self, Folder, Recorder};
+use impinge::scheme::Broken;
 use impinge::simulation::Simulation;
 use impinge::source::Nozzle;
 use miette::{Report, miette};
@@ -58,7 +59,14 @@ pub(super) fn run(args: &Args) -> Result<Ending, Failure> {
         Ok(outcome) => outcome,
         Err(broken) => {
             let kept = recorder.abandon().map_err(|error| Failure::Run(report(&error)))?;
-            let help = format!("what was measured until then is in {}; please report the scene", kept.display());
+            let remedy = match broken {
+                Broken::Jammed { .. } => {
+                    "grains that lose much in every collision gather and collide ever faster: raise `restitution` or lower `friction`"
+                }
+                Broken::OutOfPlane { .. } => "give the scene a surface that does not change along y",
+                Broken::Overlap { .. } | Broken::NotANumber { .. } => "please report the scene",
+            };
+            let help = format!("{remedy}; what was measured until then is in {}", kept.display());
             return Err(Failure::Run(miette!(help = help, "{broken}")));
         }
     };
