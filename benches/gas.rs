@@ -12,7 +12,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use impinge::grains::NewGrain;
 use impinge::law::{ContactLaw, Friction};
 use impinge::scene::{Interference, Scene};
-use impinge::scheme::{EventDriven, Laws};
+use impinge::scheme::{Collapse, EventDriven, Laws};
 use impinge::{simulation, source};
 use impinge_events::calendar::{Calendar, PlainCalendar, Tournament};
 use impinge_events::{Domain, NoSurface};
@@ -35,7 +35,7 @@ struct Gas<C: Calendar> {
 impl<C: Calendar> Gas<C> {
     fn new(grains: &[NewGrain], domain: Domain, fraction: f64) -> Self {
         let law = ContactLaw { restitution: 1.0, friction: Friction::Smooth };
-        let laws = Laws { grain: law, surface: law, interference: Interference::All };
+        let laws = Laws { grain: law, surface: law, interference: Interference::All, collapse: Collapse::None };
         let engine = EventDriven::new(grains, NoSurface, domain, laws, 0.0);
         Self { engine, rate: rate(grains, fraction), grains: grains.len() }
     }

@@ -9,7 +9,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use impinge::grains::NewGrain;
 use impinge::law::{ContactLaw, Friction};
 use impinge::scene::{self, Interference, PlaneSurface, RectangleSurface, Scene};
-use impinge::scheme::{EventDriven, Laws};
+use impinge::scheme::{Collapse, EventDriven, Laws};
 use impinge::source;
 use impinge::surface::Surface;
 use impinge_events::calendar::{Calendar, PlainCalendar, Tournament};
@@ -83,7 +83,7 @@ impl impinge_events::Surface for Shared<'_> {
 /// A whole run, from the placed grains to the end; gives the number of grain–grain collisions.
 fn run<C: Calendar>(grains: &[NewGrain], surface: &Surface) -> u64 {
     let law = ContactLaw { restitution: 0.8, friction: Friction::Smooth };
-    let laws = Laws { grain: law, surface: law, interference: Interference::All };
+    let laws = Laws { grain: law, surface: law, interference: Interference::All, collapse: Collapse::Elastic };
     let mut engine: EventDriven<_, C> = EventDriven::new(grains, Shared(surface), Domain::unbounded(), laws, 0.0);
     advance(&mut engine, UNTIL)
 }

@@ -182,7 +182,8 @@ fn laws(scene: &Scene) -> Result<Laws, Invalid> {
         None if scene.surface.is_empty() => unused,
         None => return Err(missing("contact.surface", "the scene has a surface")),
     };
-    Ok(Laws { grain, surface, interference: scene.run.interference })
+    let (interference, collapse) = (scene.run.interference, scene.contact.collapse);
+    Ok(Laws { grain, surface, interference, collapse })
 }
 
 /// The domain as the engine needs it.

@@ -31,7 +31,7 @@ use impinge::grains::NewGrain;
 use impinge::law::{ContactLaw, Friction};
 use impinge::observe::{Ledger, SurfaceEnergy};
 use impinge::scene::{Interference, Scene};
-use impinge::scheme::{EventDriven, Laws, Observer as _};
+use impinge::scheme::{Collapse, EventDriven, Laws, Observer as _};
 use impinge::source;
 use impinge_events::Domain;
 use nalgebra::Vector3;
@@ -128,7 +128,7 @@ fn jet(count: u32) -> Vec<NewGrain> {
 /// Runs one copy to its end, checks its ledger and gives its rows.
 fn rows(grains: &[NewGrain], friction: Friction) -> Rows<f64> {
     let law = ContactLaw { restitution: 0.8, friction };
-    let laws = Laws { grain: law, surface: law, interference: Interference::All };
+    let laws = Laws { grain: law, surface: law, interference: Interference::All, collapse: Collapse::Elastic };
     let mut engine: EventDriven<_> = EventDriven::new(grains, FLOOR, Domain::unbounded(), laws, 0.0);
     let mut observer = (Ledger::default(), SurfaceEnergy::default());
     engine.snapshot(0.0, |snapshot| observer.sample(snapshot));

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use impinge::grains::NewGrain;
 use impinge::law::{Body, ContactLaw, Friction, resolve_pair, resolve_surface};
 use impinge::scene::{self, Interference};
-use impinge::scheme::{EventDriven, GrainCollision, Laws, Observer, SurfaceHit};
+use impinge::scheme::{Collapse, EventDriven, GrainCollision, Laws, Observer, SurfaceHit};
 use impinge::surface::Surface;
 use impinge_events::calendar::{Calendar, PlainCalendar, Tournament};
 use impinge_events::contact_time::sphere_sphere;
@@ -278,7 +278,7 @@ fn scatter(
 
 fn laws(e: f64, friction: Friction) -> Laws {
     let law = ContactLaw { restitution: e, friction };
-    Laws { grain: law, surface: law, interference: Interference::All }
+    Laws { grain: law, surface: law, interference: Interference::All, collapse: Collapse::None }
 }
 
 const ROUGH: Friction = Friction::Coulomb { static_: 0.4, dynamic: 0.3 };

@@ -62,6 +62,7 @@ impl FakeJet {
             energy_spin: 0.0,
             dissipated: 0.0,
             work: 0.0,
+            withheld: 0.0,
             overlap_over_radius: 0.0,
         }
     }
@@ -142,6 +143,7 @@ impl<O: Observer> State<'_, O> {
             energy_normal: 0.5 * grain.mass * before.0.velocity.z.powi(2),
             energy_tangential: 0.5 * grain.mass * along,
             dissipated: before.1 - kinetic_energy(flight, grain),
+            withheld: 0.0,
             overlap_over_radius: 1e-14,
             ..FakeJet::hit(grain.hits)
         });
@@ -168,6 +170,7 @@ impl<O: Observer> State<'_, O> {
             impulse_tangential: 0.0,
             approach_speed: approach,
             dissipated: before - energy(self),
+            withheld: 0.0,
             overlap_over_radius: -1e-15,
         });
     }

@@ -88,6 +88,7 @@ pub struct Ledger {
     inside: Amounts,
     dissipated_grain: Sum,
     dissipated_surface: Sum,
+    withheld: Sum,
     work_surface: Sum,
     surface_impulse: VectorSum,
     counts: Counts,
@@ -135,6 +136,12 @@ impl Ledger {
     #[must_use]
     pub fn dissipated_surface(&self) -> f64 {
         self.dissipated_surface.value()
+    }
+
+    /// Energy that the laws would have dissipated in collapses, where collisions are elastic, J. It stays in the grains.
+    #[must_use]
+    pub fn withheld(&self) -> f64 {
+        self.withheld.value()
     }
 
     /// Work that moving surfaces did on grains, J.
@@ -233,6 +240,7 @@ impl Observer for Ledger {
     fn grain_collision(&mut self, collision: &GrainCollision) {
         self.counts.grain_grain += 1;
         self.dissipated_grain += collision.dissipated;
+        self.withheld += collision.withheld;
         self.note_overlap(collision.overlap_over_radius);
     }
 
@@ -240,6 +248,7 @@ impl Observer for Ledger {
         self.counts.grain_surface += 1;
         self.counts.first_hits += u64::from(hit.order == 1);
         self.dissipated_surface += hit.dissipated;
+        self.withheld += hit.withheld;
         self.work_surface += hit.work;
         self.surface_impulse += hit.normal * hit.impulse_normal + hit.impulse_tangential;
         self.note_overlap(hit.overlap_over_radius);

@@ -112,6 +112,8 @@ pub struct Energy {
     pub dissipated_grain: f64,
     /// Dissipated at the surface.
     pub dissipated_surface: f64,
+    /// Not dissipated, although the laws would have it, where grains collapse; still in the grains.
+    pub withheld: f64,
     /// Work of moving surfaces on grains.
     pub work_surface: f64,
     /// What is not accounted for.
@@ -228,6 +230,7 @@ impl Summary {
                 final_: inside.energy(),
                 dissipated_grain: ledger.dissipated_grain(),
                 dissipated_surface: ledger.dissipated_surface(),
+                withheld: ledger.withheld(),
                 work_surface: ledger.work_surface(),
                 residual: ledger.energy_residual(),
                 residual_relative: ledger.relative_energy_residual(),
@@ -338,6 +341,7 @@ impl Summary {
             ("carried out of the domain", energy.left),
             ("of removed grains", energy.removed),
             ("inside at the end", energy.final_),
+            ("withheld in collapses", energy.withheld),
         ];
         writeln!(f, "energy")?;
         lines.into_iter().filter(|line| line.1 != 0.0).try_for_each(|line| self.energy_line(f, line.0, line.1, ""))?;

@@ -11,6 +11,21 @@ pub struct Contacts {
     pub grain: Option<Contact>,
     /// Between a grain and the surface; needed where there is a surface.
     pub surface: Option<Contact>,
+    /// What happens to grains that collide again and again in no time.
+    #[serde(default)]
+    pub collapse: Collapse,
+}
+
+/// What happens to grains that collide again and again in no time, as hard grains of low restitution do.
+#[derive(Clone, Copy, Debug, Default, Deserialize, Serialize, JsonSchema, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+pub enum Collapse {
+    /// After 16 hits in a row, each within 0.001 radii of flight of the one before, a grain collides elastically until it flies
+    /// freely again (after the TC model of Luding & McNamara 1998). The energy that is not dissipated so is reported.
+    #[default]
+    Elastic,
+    /// Nothing: every hit follows its law. A collapse may then take millions of hits, and may not end.
+    None,
 }
 
 /// `[contact.grain]` or `[contact.surface]`

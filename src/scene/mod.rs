@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 pub(crate) use check::{LARGEST, SMALLEST};
 pub use check::{check, check_radius};
-pub use contact::{Contact, Contacts, Friction, Regularised, StaticDynamic};
+pub use contact::{Collapse, Contact, Contacts, Friction, Regularised, StaticDynamic};
 pub use error::{Invalid, SceneError};
 pub use load::{Overrides, SceneFile};
 pub use shape::schema;

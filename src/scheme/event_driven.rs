@@ -8,8 +8,8 @@ use nalgebra::Vector3;
 
 use super::{Broken, GrainCollision, Observer, Passage, Progress, SurfaceHit};
 use crate::grains::{Grain, NewGrain, Snapshot};
-use crate::law::{Body, ContactLaw, resolve_pair, resolve_surface};
-use crate::scene::Interference;
+use crate::law::{Body, ContactLaw, Friction, resolve_pair, resolve_surface};
+use crate::scene::{Collapse, Interference};
 use crate::surface::LARGEST_SLOPE;
 
 /// Length of an epoch in the time that the fastest grain needs for its own radius (of the smallest grain).
@@ -30,8 +30,15 @@ pub const LARGEST_OVERLAP: f64 = 1e-9;
 const JAM_ENCOUNTERS_PER_GRAIN: u64 = 1000;
 const JAM_ENCOUNTERS: u64 = 1_000_000;
 const JAM_TIME: f64 = 1.0 / (1u64 << 20) as f64;
+/// A grain is part of a collapse after so many hits in a row, each within [`COLLAPSE_TIME`] of the one before. In the reference jets
+/// (restitution 0.8) no grain ever is.
+pub const COLLAPSE_HITS: u32 = 16;
+/// Part of an epoch (0.001 radii of flight of the fastest grain) within which hits are in a row.
+const COLLAPSE_TIME: f64 = 1.0 / (1u64 << 22) as f64;
 /// Speed over that of the fastest grain below which a sequence of hits has collapsed.
 const COLLAPSED: f64 = 1e-9;
+/// The law of a contact in a collapse.
+const ELASTIC: ContactLaw = ContactLaw { restitution: 1.0, friction: Friction::Smooth };
 /// Encounters between two looks at the watch (progress, Ctrl-C).
 const ENCOUNTERS_PER_WATCH: u32 = 4096;
 
@@ -44,7 +51,19 @@ pub struct Laws {
     pub surface: ContactLaw,
     /// Which collisions take part.
     pub interference: Interference,
+    /// What happens to grains that collide again and again in no time.
+    pub collapse: Collapse,
 }
+
+/// Hits in a row.
+#[derive(Clone, Copy, Debug)]
+struct Row {
+    /// Time of the latest hit, s (epoch time).
+    latest: f64,
+    hits: u32,
+}
+
+const NO_ROW: Row = Row { latest: f64::NEG_INFINITY, hits: 0 };
 
 /// Grains, what they meet, and the laws of their meetings; advanced from event to event.
 #[derive(Clone, Debug)]
@@ -52,6 +71,8 @@ pub struct EventDriven<S: Surface, C: Calendar = Tournament> {
     encounters: Encounters<S, C>,
     /// What grains carry besides their flights, by the numbers of `encounters`.
     grains: Vec<Grain>,
+    /// How the latest hits of each grain followed each other, by the same numbers; empty where collapses are not treated.
+    rows: Vec<Row>,
     laws: Laws,
     domain: Domain,
     /// Simulated time at the start of the epoch, s.
@@ -87,6 +108,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let entered = grains.len() as u64;
         let mut scheme = Self {
             encounters,
+            rows: if laws.collapse == Collapse::Elastic { vec![NO_ROW; grains.len()] } else { Vec::new() },
             grains: carried,
             laws,
             domain,
@@ -131,6 +153,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.epoch = epoch_length(self.smallest, self.fastest, self.epoch_start);
         self.encounters.start_epoch(after, self.epoch);
         self.outrun = false;
+        for row in &mut self.rows {
+            row.latest -= after;
+        }
         (self.mark, self.since_mark) = (0.0, 0);
     }
 
@@ -205,6 +230,15 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         Progress { time: self.time, collisions: self.collisions, inside: self.encounters.count() }
     }
 
+    /// Notes a hit of a grain and tells whether the grain is part of a collapse.
+    #[inline]
+    fn is_collapsing(&mut self, time: f64, grain: u32) -> bool {
+        let Some(row) = self.rows.get_mut(grain as usize) else { return false };
+        let hits = if time - row.latest <= COLLAPSE_TIME * self.epoch { row.hits.saturating_add(1) } else { 0 };
+        *row = Row { latest: time, hits };
+        hits >= COLLAPSE_HITS
+    }
+
     /// Two grains touch.
     fn collide(&mut self, time: f64, a: u32, b: u32, observer: &mut impl Observer) -> Result<(), Broken> {
         // The lower id is the first of the two: slots are used again, ids are not.
@@ -225,7 +259,13 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             self.deflect(&[(other, onwards)]);
             return Ok(());
         }
-        let contact = resolve_pair(&self.laws.grain, &first, &second, normal);
+        let mut contact = resolve_pair(&self.laws.grain, &first, &second, normal);
+        let mut withheld = 0.0;
+        // Both rows go on, whatever the first says.
+        if self.is_collapsing(time, a) | self.is_collapsing(time, b) {
+            withheld = contact.impulse.dissipated;
+            contact = resolve_pair(&ELASTIC, &first, &second, normal);
+        }
         // Where rounding has turned the slightest graze into none, both fly on.
         if contact.impulse.normal == 0.0 {
             self.encounters.deflect(&[(a, first.velocity), (b, second.velocity)]);
@@ -246,6 +286,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             impulse_tangential: contact.impulse.tangential.norm(),
             approach_speed: contact.approach_speed,
             dissipated: contact.impulse.dissipated,
+            withheld,
             overlap_over_radius,
         });
         Ok(())
@@ -263,7 +304,12 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             }
             contact.normal = Vector3::new(contact.normal.x, 0.0, contact.normal.z).normalize();
         }
-        let resolved = resolve_surface(&self.laws.surface, &before, contact.normal, contact.velocity);
+        let mut resolved = resolve_surface(&self.laws.surface, &before, contact.normal, contact.velocity);
+        let mut withheld = 0.0;
+        if self.is_collapsing(time, grain) {
+            withheld = resolved.impulse.dissipated;
+            resolved = resolve_surface(&ELASTIC, &before, contact.normal, contact.velocity);
+        }
         if resolved.impulse.normal == 0.0 {
             self.encounters.deflect(&[(grain, before.velocity)]);
             return Ok(());
@@ -296,6 +342,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             energy_tangential: 0.5 * before.mass * along.norm_squared(),
             energy_spin: 0.2 * before.mass * before.radius.powi(2) * before.spin.norm_squared(),
             dissipated: resolved.impulse.dissipated,
+            withheld,
             work: resolved.work,
             overlap_over_radius,
         });
@@ -322,8 +369,14 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let slot = self.encounters.insert(flight) as usize;
         if slot == self.grains.len() {
             self.grains.push(grain);
+            if self.laws.collapse == Collapse::Elastic {
+                self.rows.push(NO_ROW);
+            }
         } else {
             self.grains[slot] = grain;
+            if let Some(row) = self.rows.get_mut(slot) {
+                *row = NO_ROW;
+            }
         }
         observer.passage(Passage::Entered, time, &flight, &grain);
         if flight.velocity.amax() > OUTRUN * self.fastest || OUTRUN * flight.radius < self.smallest {

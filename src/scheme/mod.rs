@@ -3,13 +3,14 @@
 mod event_driven;
 mod timetable;
 
-pub use event_driven::{EventDriven, LARGEST_OVERLAP, Laws};
+pub use event_driven::{COLLAPSE_HITS, EventDriven, LARGEST_OVERLAP, Laws};
 pub use timetable::Moments;
 
 use impinge_events::Flight;
 use nalgebra::Vector3;
 
 use crate::grains::{Grain, Snapshot};
+pub use crate::scene::Collapse;
 
 /// How far a run has come.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,6 +101,8 @@ pub struct GrainCollision {
     pub approach_speed: f64,
     /// Kinetic energy dissipated, J.
     pub dissipated: f64,
+    /// Kinetic energy that the law would have dissipated, J, where the collision was elastic as part of a collapse ([`Collapse`]).
+    pub withheld: f64,
     /// Overlap at the event over the smaller radius: what rounding left (negative: a gap).
     pub overlap_over_radius: f64,
 }
@@ -133,6 +136,8 @@ pub struct SurfaceHit {
     pub energy_spin: f64,
     /// Kinetic energy dissipated, J.
     pub dissipated: f64,
+    /// Kinetic energy that the law would have dissipated, J, where the hit was elastic as part of a collapse ([`Collapse`]).
+    pub withheld: f64,
     /// Work that a moving surface does on the grain, J; 0 for one at rest.
     pub work: f64,
     /// Overlap at the event over the radius: what rounding left (negative: a gap).

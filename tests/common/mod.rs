@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 use impinge::grains::NewGrain;
 use impinge::law::{ContactLaw, Friction};
 use impinge::scene::Interference;
-use impinge::scheme::{Broken, EventDriven, GrainCollision, Laws, Observer, SurfaceHit};
+use impinge::scheme::{Broken, Collapse, EventDriven, GrainCollision, Laws, Observer, SurfaceHit};
 use impinge_events::calendar::Calendar;
 use impinge_events::contact_time::sphere_plane;
 use impinge_events::{Domain, Flight, Outlook, Surface, SurfaceContact};
@@ -66,7 +66,7 @@ impl Surface for Plane {
 /// Laws without friction: restitution between grains and with the surface.
 pub fn smooth(grain: f64, surface: f64) -> Laws {
     let law = |restitution| ContactLaw { restitution, friction: Friction::Smooth };
-    Laws { grain: law(grain), surface: law(surface), interference: Interference::All }
+    Laws { grain: law(grain), surface: law(surface), interference: Interference::All, collapse: Collapse::None }
 }
 
 /// A grain without spin, of mass `mass` (kg).
