@@ -244,7 +244,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             self.plans[grain as usize] = NO_PLAN;
         }
         match &mut self.cells {
-            Some(cells) if !cells.fits(flight.radius) || cells.crowded(self.flights.len()) => {
+            Some(cells) if !cells.fits(flight.radius) || cells.crowded(self.flights.len() - self.vacant.len()) => {
                 self.lay_out_cells(flight.time);
                 self.predict_all();
             }
@@ -273,20 +273,16 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     /// Whether a sphere at `position` with this `radius` (m) overlaps no grain at `time`.
     #[must_use]
     pub fn is_free(&self, position: Vector3<f64>, radius: f64, time: f64) -> bool {
-        let mut free = true;
-        if let Some(cells) = &self.cells {
-            if !cells.fits(radius) {
-                let far = |grain| {
-                    self.flight(grain).radius + radius < (self.flight(grain).position_at(time) - position).norm()
-                };
-                return self.inside().all(far);
-            }
-            cells.visit_near(position, time, |other, shift| {
-                let other = self.flight(other);
-                let distance = (other.position_at(time) + shift - position).norm();
-                free &= distance >= other.radius + radius;
-            });
+        let Some(cells) = &self.cells else { return true };
+        let keeps_clear = |other: u32| {
+            let other = self.flight(other);
+            self.domain.nearest(other.position_at(time) - position).norm() >= other.radius + radius
+        };
+        if !cells.fits(radius) {
+            return self.inside().all(keeps_clear);
         }
+        let mut free = true;
+        cells.visit_near(position, time, |other, _| free &= keeps_clear(other));
         free
     }
 
