@@ -32,7 +32,7 @@ const JAM_ENCOUNTERS: u64 = 1_000_000;
 const JAM_TIME: f64 = 1.0 / (1u64 << 20) as f64;
 /// A grain is part of a collapse after so many hits in a row, each within [`COLLAPSE_TIME`] of the one before. In the reference jets
 /// (restitution 0.8) no grain ever is.
-pub const COLLAPSE_HITS: u32 = 16;
+const COLLAPSE_HITS: u32 = 16;
 /// Part of an epoch (0.001 radii of flight of the fastest grain) within which hits are in a row.
 const COLLAPSE_TIME: f64 = 1.0 / (1u64 << 22) as f64;
 /// Speed over that of the fastest grain below which a sequence of hits has collapsed.

@@ -3,7 +3,7 @@
 mod event_driven;
 mod timetable;
 
-pub use event_driven::{COLLAPSE_HITS, EventDriven, LARGEST_OVERLAP, Laws};
+pub use event_driven::{EventDriven, LARGEST_OVERLAP, Laws};
 pub use timetable::Moments;
 
 use impinge_events::Flight;
