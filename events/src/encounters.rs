@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::calendar::{Calendar, Event, Kind, Tournament};
-use crate::contact_time::sphere_sphere_until;
+use crate::contact_time::{sphere_sphere, spheres_may_touch};
 use crate::neighbors::Cells;
 use crate::{Domain, Flight, NoSurface, Outlook, Surface};
 
@@ -509,7 +509,10 @@ impl Search<'_> {
     fn consider(&mut self, other: u32, shift: Vector3<f64>) {
         self.looks += 1;
         let theirs = &self.flights[other as usize];
-        let Some(time) = sphere_sphere_until(&self.flight, theirs, shift, self.until) else { return };
+        if !spheres_may_touch(&self.flight, theirs, shift, self.until) {
+            return;
+        }
+        let Some(time) = sphere_sphere(&self.flight, theirs, shift) else { return };
         if time > self.until {
             return;
         }

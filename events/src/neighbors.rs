@@ -42,14 +42,30 @@ fn contact_width(largest_radius: f64) -> f64 {
 /// Where a grain stands in the grid.
 #[derive(Clone, Copy, Debug)]
 struct Place {
-    /// Cell along each axis; counts on beyond the period.
+    /// Cell along each axis; in a periodic domain, the one in the period.
     cell: Vector3<i32>,
-    slot: u32,
+    /// The next grain that shares the slot.
     next: u32,
-    previous: u32,
 }
 
-const NOWHERE: Place = Place { cell: Vector3::new(0, 0, 0), slot: 0, next: NOBODY, previous: NOBODY };
+const NOWHERE: Place = Place { cell: Vector3::new(0, 0, 0), next: NOBODY };
+
+/// Adjacent cells along one axis, at most three.
+struct Adjacent {
+    cells: [Side; 3],
+    count: usize,
+}
+
+/// One of them.
+#[derive(Clone, Copy, Default)]
+struct Side {
+    /// Its number in the period.
+    cell: i32,
+    /// What it adds to the number of a slot.
+    slot: u32,
+    /// How many periods on it lies.
+    turn: i32,
+}
 
 /// A crossing: when, and into which cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,10 +82,16 @@ struct Layout {
     size: Vector3<f64>,
     /// Cells in a period along each axis; 0 where there is none.
     period: Vector3<i32>,
+    /// Length of the period along each axis, m; 0 where there is none.
+    extent: Vector3<f64>,
     /// Corner of cell (0, 0, 0) at epoch time 0, m.
     corner: Vector3<f64>,
-    /// Velocity, m/s.
+    /// Velocity of that corner, m/s.
     drift: Vector3<f64>,
+    /// By which part of its size at `born` a cell grows in a second, 1/s; never negative.
+    growth: Vector3<f64>,
+    /// When the cells were laid out, s (epoch time).
+    born: f64,
 }
 
 /// The grid.
@@ -77,8 +99,11 @@ struct Layout {
 pub(crate) struct Cells {
     layout: Layout,
     domain: Domain,
+    /// The first grain in each slot.
     heads: Vec<u32>,
     places: Vec<Place>,
+    /// In a periodic domain, how many periods the cell of a grain lies beyond its place in the period, seen from its stored position.
+    turns: Vec<Vector3<i32>>,
 }
 
 impl Layout {
@@ -88,7 +113,8 @@ impl Layout {
     fn new(domain: &Domain, largest_radius: f64, width: Option<f64>, flights: &[Flight], now: f64) -> Self {
         let contact = contact_width(largest_radius);
         let axes = domain.axes();
-        let (mut corner, mut extent, mut drift) = (Vector3::zeros(), Vector3::repeat(contact), Vector3::zeros());
+        let (mut corner, mut extent) = (Vector3::zeros(), Vector3::repeat(contact));
+        let (mut drift, mut growth) = (Vector3::zeros(), Vector3::zeros());
         for &axis in axes {
             if domain.periodic {
                 (corner[axis], extent[axis]) = (domain.min[axis], domain.max[axis] - domain.min[axis]);
@@ -96,8 +122,8 @@ impl Layout {
                 let mut places: Vec<f64> = flights.iter().map(|flight| flight.position_at(now)[axis]).collect();
                 // A few grains that fly ahead do not count.
                 let [low, high] = [quantile(&mut places, 0.05), quantile(&mut places, 0.95)];
-                let mut velocities: Vec<f64> = flights.iter().map(|flight| flight.velocity[axis]).collect();
-                drift[axis] = quantile(&mut velocities, 0.5);
+                let flow = Flow::along(axis, flights, now);
+                (drift[axis], growth[axis]) = (flow.velocity_at(low), flow.growth);
                 corner[axis] = low - drift[axis] * now;
                 extent[axis] = contact.max((high - low) / 0.9);
             }
@@ -112,12 +138,72 @@ impl Layout {
                 size[axis] = extent[axis] / f64::from(period[axis]);
             }
         }
-        Self { size, period, corner, drift }
+        let extent = if domain.periodic { period.zip_map(&domain.extent(), |n, length| if n > 0 { length } else { 0.0 }) } else { Vector3::zeros() };
+        Self { size, period, extent, corner, drift, growth, born: now }
     }
 
-    /// How many cells `flights` cross in a second.
-    fn crossing_rate(&self, flights: &[Flight]) -> f64 {
-        flights.iter().map(|flight| (flight.velocity - self.drift).component_div(&self.size).lp_norm(1)).sum()
+    /// How large cells are at `time` (s, epoch time), in units of their size.
+    #[inline]
+    fn scale(&self, time: f64) -> Vector3<f64> {
+        (self.growth * (time - self.born)).add_scalar(1.0)
+    }
+
+    /// Velocity of side `number` of the cells along `axis`, m/s.
+    #[inline]
+    fn side_velocity(&self, axis: usize, number: i32) -> f64 {
+        self.drift[axis] + f64::from(number) * self.size[axis] * self.growth[axis]
+    }
+
+    /// How many cells `flights` cross in a second, as they are at `now` (s, epoch time).
+    fn crossing_rate(&self, flights: &[Flight], now: f64) -> f64 {
+        let scale = self.scale(now);
+        let rate = |flight: &Flight| {
+            let place = flight.position_at(now) - (self.corner + self.drift * now);
+            let flow = self.drift + place.component_div(&scale).component_mul(&self.growth);
+            (flight.velocity - flow).component_div(&self.size).component_div(&scale).lp_norm(1)
+        };
+        flights.iter().map(rate).sum()
+    }
+}
+
+/// How a stream moves along one axis: its velocity rises with the place, as that of a spray that flies apart does.
+struct Flow {
+    /// Velocity at the origin, m/s.
+    velocity: f64,
+    /// Rise of the velocity, 1/s; never negative.
+    growth: f64,
+}
+
+impl Flow {
+    /// The flow along `axis` that `flights` follow as they are at `now` (s, epoch time).
+    ///
+    /// The rise is that of the line of least squares if that leaves less to be crossed than none; the velocity is the median of what is
+    /// left, which makes the fewest crossings.
+    fn along(axis: usize, flights: &[Flight], now: f64) -> Self {
+        let count = flights.len() as f64;
+        let state = |flight: &Flight| (flight.position_at(now)[axis], flight.velocity[axis]);
+        let sums = flights.iter().map(state).fold((0.0, 0.0), |(x, v), state| (x + state.0, v + state.1));
+        let (mean_x, mean_v) = (sums.0 / count, sums.1 / count);
+        let (mut spread, mut rise) = (0.0, 0.0);
+        for (x, v) in flights.iter().map(state) {
+            spread += (x - mean_x) * (x - mean_x);
+            rise += (x - mean_x) * (v - mean_v);
+        }
+        let with = |growth: f64| {
+            let mut rests: Vec<f64> = flights.iter().map(state).map(|(x, v)| v - growth * x).collect();
+            let velocity = quantile(&mut rests, 0.5);
+            (Self { velocity, growth }, rests.iter().map(|rest| (rest - velocity).abs()).sum::<f64>())
+        };
+        let (still, to_cross) = with(0.0);
+        if !(rise > 0.0) {
+            return still;
+        }
+        let (flow, less) = with(rise / spread);
+        if less < to_cross { flow } else { still }
+    }
+
+    fn velocity_at(&self, place: f64) -> f64 {
+        self.velocity + self.growth * place
     }
 }
 
@@ -140,7 +226,7 @@ impl Cells {
     }
 
     fn empty(domain: Domain, layout: Layout, grains: usize) -> Self {
-        Self { layout, domain, heads: vec![NOBODY; slots(grains)], places: Vec::new() }
+        Self { layout, domain, heads: vec![NOBODY; slots(grains)], places: Vec::new(), turns: Vec::new() }
     }
 
     /// An empty grid that suits `flights` better, if it is worth its cost; `crossings` and `looks` are what this one took lately.
@@ -160,7 +246,7 @@ impl Cells {
         let wider = (crossing / (dimensions * looking)).powf(1.0 / (dimensions + 1.0)).clamp(0.5, 2.0);
         let width = self.layout.size.x * wider;
         let layout = Layout::new(&self.domain, largest_radius, Some(width), flights, now);
-        let fewer = layout.crossing_rate(flights) / self.layout.crossing_rate(flights);
+        let fewer = layout.crossing_rate(flights, now) / self.layout.crossing_rate(flights, now);
         let more = (layout.size.x / self.layout.size.x).powf(dimensions);
         let worth_it = fewer * crossing + more * looking < WORTH_A_NEW_LAYOUT * (crossing + looking);
         worth_it.then(|| Self::empty(self.domain, layout, flights.len()))
@@ -182,92 +268,124 @@ impl Cells {
     }
 
     fn cell_of(&self, position: Vector3<f64>, time: f64) -> Vector3<i32> {
-        let mut cell = self.relative(position, time).component_div(&self.layout.size).map(|x| x.floor() as i32);
+        let size = self.layout.size.component_mul(&self.layout.scale(time));
+        let mut cell = self.relative(position, time).component_div(&size).map(|x| x.floor() as i32);
         if self.domain.planar {
             cell.y = 0;
         }
         cell
     }
 
-    /// Coordinate along `axis` of the cell in the period that stands for `cell`.
-    #[inline]
-    fn home(&self, cell: Vector3<i32>, axis: usize) -> i32 {
-        if self.layout.period[axis] == 0 { cell[axis] } else { cell[axis].rem_euclid(self.layout.period[axis]) }
+    /// The cell in the period that stands for `cell`, and how many periods apart they are.
+    fn home(&self, mut cell: Vector3<i32>) -> (Vector3<i32>, Vector3<i32>) {
+        let mut turns = Vector3::zeros();
+        if self.domain.periodic {
+            for &axis in self.domain.axes() {
+                turns[axis] = cell[axis].div_euclid(self.layout.period[axis]);
+                cell[axis] -= turns[axis] * self.layout.period[axis];
+            }
+        }
+        (cell, turns)
     }
 
     /// The slot of a cell in the period.
     #[inline]
-    fn slot(&self, home: Vector3<i32>) -> usize {
-        let sum = home.zip_map(&STRIDES, |k, stride| (k as u32).wrapping_mul(stride));
+    fn slot(&self, cell: Vector3<i32>) -> usize {
+        let sum = cell.zip_map(&STRIDES, |k, stride| (k as u32).wrapping_mul(stride));
         (sum.x.wrapping_add(sum.y).wrapping_add(sum.z)) as usize & (self.heads.len() - 1)
-    }
-
-    fn slot_of(&self, cell: Vector3<i32>) -> usize {
-        self.slot(Vector3::from_fn(|axis, _| self.home(cell, axis)))
     }
 
     /// Puts grain `id` into the cell where it is at `now` (s, epoch time).
     pub(crate) fn insert(&mut self, id: u32, flight: &Flight, now: f64) {
         if self.places.len() <= id as usize {
             self.places.resize(id as usize + 1, NOWHERE);
+            if self.domain.periodic {
+                self.turns.resize(id as usize + 1, Vector3::zeros());
+            }
         }
-        self.places[id as usize].cell = self.cell_of(flight.position_at(now), now);
+        let (cell, turns) = self.home(self.cell_of(flight.position_at(now), now));
+        self.places[id as usize].cell = cell;
+        if self.domain.periodic {
+            self.turns[id as usize] = turns;
+        }
         self.link(id);
     }
 
+    #[inline]
     fn link(&mut self, id: u32) {
-        let slot = self.slot_of(self.places[id as usize].cell);
-        let first = std::mem::replace(&mut self.heads[slot], id);
-        let place = &mut self.places[id as usize];
-        (place.slot, place.next, place.previous) = (slot as u32, first, NOBODY);
-        if first != NOBODY {
-            self.places[first as usize].previous = id;
-        }
+        let slot = self.slot(self.places[id as usize].cell);
+        self.places[id as usize].next = std::mem::replace(&mut self.heads[slot], id);
     }
 
     /// Takes grain `id` out.
+    #[inline]
     pub(crate) fn remove(&mut self, id: u32) {
-        let Place { slot, next, previous, .. } = self.places[id as usize];
-        if previous == NOBODY {
-            self.heads[slot as usize] = next;
-        } else {
-            self.places[previous as usize].next = next;
+        let Place { cell, next } = self.places[id as usize];
+        let slot = self.slot(cell);
+        // Few grains share a slot.
+        let mut other = self.heads[slot];
+        if other == id {
+            self.heads[slot] = next;
+            return;
         }
-        if next != NOBODY {
-            self.places[next as usize].previous = previous;
+        while self.places[other as usize].next != id {
+            other = self.places[other as usize].next;
         }
+        self.places[other as usize].next = next;
     }
 
     /// Tells the grid that a periodic wrap has moved the stored position of `id` by `shift`.
     pub(crate) fn wrapped(&mut self, id: u32, shift: Vector3<f64>) {
-        let periods = shift.component_div(&self.domain.extent()).map(|x| x.round() as i32);
-        self.places[id as usize].cell += periods.component_mul(&self.layout.period);
+        self.turns[id as usize] += shift.component_div(&self.domain.extent()).map(|x| x.round() as i32);
+    }
+
+    /// The cell of grain `id` as its stored position sees it, beyond the period if need be.
+    #[inline]
+    fn seen(&self, id: u32) -> Vector3<i32> {
+        let cell = self.places[id as usize].cell;
+        if self.domain.periodic { cell + self.turns[id as usize].component_mul(&self.layout.period) } else { cell }
     }
 
     /// When and through which side `flight` leaves its cell.
     pub(crate) fn crossing(&self, id: u32, flight: &Flight) -> Crossing {
-        let cell = self.places[id as usize].cell;
+        let cell = self.seen(id);
         let y = self.relative(flight.position, flight.time);
-        let v = flight.velocity - self.layout.drift;
+        let size = self.layout.size.component_mul(&self.layout.scale(flight.time));
         let mut first = Crossing { time: f64::INFINITY, axis: 0 };
         for &axis in self.domain.axes() {
-            if v[axis] != 0.0 {
-                let side = f64::from(cell[axis] + i32::from(v[axis] > 0.0)) * self.layout.size[axis];
-                let time = flight.time + (side - y[axis]) / v[axis];
-                if time < first.time {
-                    first = Crossing { time, axis: axis as u8 };
-                }
+            let Some((step, speed)) = self.way_out(cell, flight, axis) else { continue };
+            let side = f64::from(cell[axis] + i32::from(step > 0)) * size[axis];
+            let time = flight.time + (side - y[axis]) / speed;
+            if time < first.time {
+                first = Crossing { time, axis: axis as u8 };
             }
         }
         first
     }
 
+    /// Through which side along `axis` (1 or -1) a flight leaves its cell, and how fast (m/s) it approaches that side; `None` where it never
+    /// does.
+    #[inline]
+    fn way_out(&self, cell: Vector3<i32>, flight: &Flight, axis: usize) -> Option<(i32, f64)> {
+        let v = flight.velocity[axis];
+        let to_upper = v - self.layout.side_velocity(axis, cell[axis] + 1);
+        if to_upper > 0.0 {
+            return Some((1, to_upper));
+        }
+        let to_lower = v - self.layout.side_velocity(axis, cell[axis]);
+        (to_lower < 0.0).then_some((-1, to_lower))
+    }
+
     /// Moves grain `id` into the next cell along `axis` and tells which way it went.
     pub(crate) fn cross(&mut self, id: u32, flight: &Flight, axis: u8) -> i32 {
         let axis = usize::from(axis);
-        let step = if flight.velocity[axis] > self.layout.drift[axis] { 1 } else { -1 };
+        let step = self.way_out(self.seen(id), flight, axis).map_or(1, |(step, _)| step);
         self.remove(id);
-        self.places[id as usize].cell[axis] += step;
+        let Side { cell, turn, .. } = self.side(axis, self.places[id as usize].cell[axis] + step);
+        self.places[id as usize].cell[axis] = cell;
+        if self.domain.periodic {
+            self.turns[id as usize][axis] += turn;
+        }
         self.link(id);
         step
     }
@@ -296,34 +414,38 @@ impl Cells {
 
     #[inline]
     fn visit_others(&self, id: u32, from: Vector3<i32>, to: Vector3<i32>, mut visit: impl FnMut(u32, Vector3<f64>)) {
-        self.visit_cells(self.places[id as usize].cell, from, to, |other, shift| {
+        let turns = if self.domain.periodic { self.turns[id as usize] } else { Vector3::zeros() };
+        self.visit_cells(self.places[id as usize].cell, turns, from, to, |other, shift| {
             if other != id {
                 visit(other, shift);
             }
         });
     }
 
-    /// Calls `visit` with every grain in the cells whose steps from `centre` lie between `from` and `to` on each axis.
+    /// Calls `visit` with every grain in the cells whose steps from `centre`, a cell in the period, lie between `from` and `to` on each axis,
+    /// and with the shift (m) that brings it beside a grain in `centre` that lies `turns` periods on.
     #[inline]
     fn visit_cells(
         &self,
         centre: Vector3<i32>,
+        turns: Vector3<i32>,
         from: Vector3<i32>,
         to: Vector3<i32>,
         mut visit: impl FnMut(u32, Vector3<f64>),
     ) {
         let mask = self.heads.len() - 1;
-        for z in from.z..=to.z {
-            for y in from.y..=to.y {
-                let row = centre + Vector3::new(0, y, z);
-                let start = self.slot(Vector3::new(0, self.home(row, 1), self.home(row, 2)));
-                for x in from.x..=to.x {
-                    let cell = row + Vector3::new(x, 0, 0);
-                    let mut other = self.heads[(start + self.home(cell, 0) as usize) & mask];
+        let adjacent = |axis: usize| self.adjacent(axis, centre[axis], from[axis], to[axis]);
+        let [along_x, along_y, along_z] = [adjacent(0), adjacent(1), adjacent(2)];
+        for z in &along_z.cells[..along_z.count] {
+            for y in &along_y.cells[..along_y.count] {
+                for x in &along_x.cells[..along_x.count] {
+                    let slot = x.slot.wrapping_add(y.slot).wrapping_add(z.slot) as usize & mask;
+                    let cell = Vector3::new(x.cell, y.cell, z.cell);
+                    let mut other = self.heads[slot];
                     while other != NOBODY {
                         let place = &self.places[other as usize];
-                        if let Some(shift) = self.image(cell, place.cell) {
-                            visit(other, shift);
+                        if place.cell == cell {
+                            visit(other, self.shift(other, turns + Vector3::new(x.turn, y.turn, z.turn)));
                         }
                         other = place.next;
                     }
@@ -332,29 +454,40 @@ impl Cells {
         }
     }
 
-    /// The shift (m) that brings what is stored as being in `stored` to `cell`; `None` if the two are different cells.
+    /// The cells from `centre + from` to `centre + to` along `axis`, at most three.
     #[inline]
-    fn image(&self, cell: Vector3<i32>, stored: Vector3<i32>) -> Option<Vector3<f64>> {
-        if cell == stored {
-            return Some(Vector3::zeros());
+    fn adjacent(&self, axis: usize, centre: i32, from: i32, to: i32) -> Adjacent {
+        let mut cells = [Side::default(); 3];
+        let mut count = 0;
+        for (side, step) in cells.iter_mut().zip(from..=to) {
+            *side = self.side(axis, centre.wrapping_add(step));
+            count += 1;
         }
+        Adjacent { cells, count }
+    }
+
+    /// The cell in the period that stands for `cell`, which is at most one step outside of it.
+    #[inline]
+    fn side(&self, axis: usize, cell: i32) -> Side {
+        let period = self.layout.period[axis];
+        let turn = if period == 0 { 0 } else { i32::from(cell >= period) - i32::from(cell < 0) };
+        let cell = cell - turn * period;
+        Side { cell, slot: (cell as u32).wrapping_mul(STRIDES[axis]), turn }
+    }
+
+    /// The shift (m) that brings grain `other` to where its cell is, `turns` periods on.
+    #[inline]
+    fn shift(&self, other: u32, turns: Vector3<i32>) -> Vector3<f64> {
         if !self.domain.periodic {
-            return None;
+            return Vector3::zeros();
         }
-        let mut shift = Vector3::zeros();
-        for &axis in self.domain.axes() {
-            let (steps, period) = (cell[axis] - stored[axis], self.layout.period[axis]);
-            if steps % period != 0 {
-                return None;
-            }
-            shift[axis] = f64::from(steps / period) * (self.domain.max[axis] - self.domain.min[axis]);
-        }
-        Some(shift)
+        (turns - self.turns[other as usize]).map(f64::from).component_mul(&self.layout.extent)
     }
 
     /// Calls `visit` with every grain in the cells around `position`, where there need not be a grain.
     pub(crate) fn visit_near(&self, position: Vector3<f64>, time: f64, visit: impl FnMut(u32, Vector3<f64>)) {
         let (from, to) = self.all_around();
-        self.visit_cells(self.cell_of(position, time), from, to, visit);
+        let (cell, turns) = self.home(self.cell_of(position, time));
+        self.visit_cells(cell, turns, from, to, visit);
     }
 }

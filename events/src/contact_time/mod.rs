@@ -5,7 +5,7 @@ mod sphere_sphere;
 mod sphere_triangle;
 
 pub use sphere_plane::sphere_plane;
-pub use sphere_sphere::{sphere_sphere, sphere_sphere_until};
+pub use sphere_sphere::{sphere_sphere, spheres_may_touch};
 pub use sphere_triangle::{Edge, Face, Sweep, sphere_corner, sphere_triangle};
 
 /// Approach speeds below this fraction of the speeds they are the difference of are rounding, not approach.
