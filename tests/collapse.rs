@@ -54,16 +54,17 @@ fn a_jet_of_restitution_0_8_is_the_same_bit_for_bit() {
     assert_eq!(surface.all_hits(), plain_surface.all_hits());
 }
 
-/// Two grains and a wall at restitution 0.15: the collapse of PHYSICS hard case 2. What is left by the treatment is below 1e-12 E0.
+/// Two grains and a wall at restitution 0.15: the collapse of PHYSICS hard case 2 is in a line and dies out by itself; the treatment counted 16
+/// quick hits and kept some of its energy.
 #[test]
-fn the_collapse_of_two_grains_keeps_its_energy() {
-    let laws = Laws { collapse: Collapse::Elastic, ..smooth(0.15, 0.15) };
+fn the_collapse_of_two_grains_kept_energy() {
+    let laws = smooth(0.15, 0.15);
     let fall = -Vector3::z();
     let grains = [grain(Vector3::z() * 0.8, fall, 0.5, 1.0), grain(Vector3::z() * 2.0, fall, 0.5, 1.0)];
     let mut engine: EventDriven<common::Plane> = EventDriven::new(&grains, FLOOR, Domain::unbounded(), laws, 0.0);
     let mut surface = SurfaceEnergy::default();
     run(&mut engine, 10.0, &mut surface).expect("no jam");
-    assert!(kinetic_energy(&states(&engine, 10.0)) < 1e-12);
+    assert!(kinetic_energy(&states(&engine, 10.0)) < 1e-28);
     // PHYSICS section 4 gives 0.6451 E0; the sum of the closed form is 0.645047.
     assert!((surface.all_hits() - 0.645_047).abs() < 1e-6, "{}", surface.all_hits());
 }

@@ -12,7 +12,7 @@ use std::slice;
 
 use common::{FLOOR, Hit, Log, grain, kinetic_energy, run, smooth, states};
 use impinge::scene::{self, Interference};
-use impinge::scheme::{EventDriven, Laws};
+use impinge::scheme::{Collapse, EventDriven, Laws};
 use impinge::surface::Surface;
 use impinge_events::Domain;
 use impinge_events::contact_time::STANDSTILL;
@@ -457,12 +457,14 @@ fn collapse_did_not_end_at_subnormal_speeds() {
     assert!(played.last.iter().all(|v| v.abs() < STANDSTILL), "{:?}", played.last);
 }
 
-/// A grain a thousand times as heavy as the inner one needs more than a million hits to come to rest.
+/// A grain a thousand times as heavy as the inner one needs more than a million hits to come to rest, too slowly for the treatment of
+/// collapses to wait.
 #[test]
 fn a_long_collapse_was_told_as_a_jam() {
     let sequence = Sequence { m2: 1000.0, ..equal(0.05) };
     assert!(sequence.collapses());
-    let mut scheme = scheme(&sequence, [0.5, 0.5], laws(&sequence));
+    let laws = Laws { collapse: Collapse::None, ..laws(&sequence) };
+    let mut scheme = scheme(&sequence, [0.5, 0.5], laws);
     run(&mut scheme, 1000.0, &mut ()).expect("no jam");
     assert!(kinetic_energy(&states(&scheme, 1000.0)) < 1e-12 * 0.5 * (sequence.m1 + sequence.m2));
 }

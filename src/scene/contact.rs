@@ -20,8 +20,9 @@ pub struct Contacts {
 #[derive(Clone, Copy, Debug, Default, Deserialize, Serialize, JsonSchema, PartialEq, Eq)]
 #[serde(rename_all = "kebab-case")]
 pub enum Collapse {
-    /// After 16 hits in a row, each within 0.001 radii of flight of the one before, a grain collides elastically until it flies
-    /// freely again (after the TC model of Luding & McNamara 1998). The energy that is not dissipated so is reported.
+    /// A grain that hits at least three partners 16 times in a row, each within 0.001 radii of flight of the hit before, collides elastically
+    /// until it flies freely again (after the TC model of Luding & McNamara 1998); so does one between two partners whose approach
+    /// speed has not halved in 64 such hits. The energy that is not dissipated so is reported.
     #[default]
     Elastic,
     /// Nothing: every hit follows its law. A collapse may then take millions of hits, and may not end.

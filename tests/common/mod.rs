@@ -66,7 +66,7 @@ impl Surface for Plane {
 /// Laws without friction: restitution between grains and with the surface.
 pub fn smooth(grain: f64, surface: f64) -> Laws {
     let law = |restitution| ContactLaw { restitution, friction: Friction::Smooth };
-    Laws { grain: law(grain), surface: law(surface), interference: Interference::All, collapse: Collapse::None }
+    Laws { grain: law(grain), surface: law(surface), interference: Interference::All, collapse: Collapse::Elastic }
 }
 
 /// A grain without spin, of mass `mass` (kg).
