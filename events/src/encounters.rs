@@ -4,8 +4,9 @@ use nalgebra::Vector3;
 
 use crate::calendar::{Calendar, Event, Kind, Tournament};
 use crate::contact_time::{sphere_sphere, spheres_may_touch};
+use crate::lists::{Lists, skin};
 use crate::neighbors::Cells;
-use crate::{Domain, Flight, NoSurface, Outlook, Surface};
+use crate::{Bend, Domain, Flight, NoSurface, Outlook, Surface};
 
 /// What happens next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,6 +79,28 @@ impl Plan {
     }
 }
 
+/// Who can meet whom.
+#[derive(Clone, Debug)]
+enum Neighbors {
+    /// Nobody: grains pass through each other.
+    Nobody,
+    /// For long flights.
+    Cells(Cells),
+    /// For short sub-steps.
+    Lists(Lists),
+}
+
+/// Two grains that touch or nearly do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Touch {
+    /// The lower number.
+    pub a: u32,
+    /// The higher number.
+    pub b: u32,
+    /// From the centre of `a` to that of `b`, m.
+    pub apart: Vector3<f64>,
+}
+
 /// Grains in free flight, and the order in which they meet each other and the surface.
 ///
 /// [`next_before`](Self::next_before) gives the next encounter with its grains advanced to it; the caller decides what it does to
@@ -104,8 +127,7 @@ impl Plan {
 pub struct Encounters<S: Surface = NoSurface, C: Calendar = Tournament> {
     flights: Vec<Flight>,
     plans: Vec<Plan>,
-    /// Absent where grains pass through each other.
-    cells: Option<Cells>,
+    neighbors: Neighbors,
     calendar: C,
     surface: S,
     domain: Domain,
@@ -113,6 +135,8 @@ pub struct Encounters<S: Surface = NoSurface, C: Calendar = Tournament> {
     vacant: Vec<u32>,
     /// End of the epoch: nothing beyond it is scheduled.
     horizon: f64,
+    /// Accelerations of the grains, m/s²; empty where none acts. Then the flights are chords ([`Bend`]) and the epoch is a sub-step.
+    accelerations: Vec<Vector3<f64>>,
     /// Cells crossed since their layout was last thought over.
     crossings: usize,
     /// Neighbours looked at since then.
@@ -147,12 +171,13 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         Self {
             flights,
             plans,
-            cells: None,
+            neighbors: Neighbors::Nobody,
             calendar,
             surface,
             domain,
             vacant: Vec::new(),
             horizon: f64::INFINITY,
+            accelerations: Vec::new(),
             crossings: 0,
             looks: 0,
         }
@@ -163,6 +188,26 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     #[must_use]
     pub fn flight(&self, grain: u32) -> &Flight {
         &self.flights[grain as usize]
+    }
+
+    /// How a grain departs from its stored flight, its chord; not at all where nothing accelerates it.
+    #[inline]
+    #[must_use]
+    pub fn bend(&self, grain: u32) -> Bend {
+        let acceleration = self.accelerations.get(grain as usize).copied().unwrap_or_else(Vector3::zeros);
+        let step = if self.horizon < f64::INFINITY { self.horizon } else { 0.0 };
+        Bend { acceleration, step }
+    }
+
+    /// Changes the acceleration (m/s²) of a grain that has just met something and is yet to be deflected: place and velocity stay, the chord
+    /// changes.
+    pub fn accelerate(&mut self, grain: u32, acceleration: Vector3<f64>) {
+        let before = self.bend(grain);
+        self.accelerations[grain as usize] = acceleration;
+        let after = self.bend(grain);
+        let flight = &mut self.flights[grain as usize];
+        flight.position += before.offset(flight.time) - after.offset(flight.time);
+        flight.velocity += before.velocity(flight.time) - after.velocity(flight.time);
     }
 
     /// The numbers of all grains that are inside, in ascending order.
@@ -223,6 +268,12 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             self.flights[grain as usize].velocity = velocity;
             self.release_partner(grain);
         }
+        if let Neighbors::Lists(lists) = &self.neighbors {
+            let keeps = |&(grain, _): &(u32, Vector3<f64>)| lists.holds(grain, self.flight(grain), self.horizon);
+            if !grains.iter().all(keeps) {
+                return self.leave_lists(self.flight(grains[0].0).time);
+            }
+        }
         for &(grain, _) in grains {
             self.predict(grain);
         }
@@ -234,25 +285,39 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     }
 
     /// Takes a grain in and gives its number. Numbers of grains that have been removed are used again.
-    pub fn insert(&mut self, flight: Flight) -> u32 {
+    ///
+    /// It is accelerated at `acceleration` (m/s²) until the next sub-step, if there are such.
+    pub fn insert(&mut self, mut flight: Flight, acceleration: Vector3<f64>) -> u32 {
+        if !self.accelerations.is_empty() {
+            let bend = Bend { acceleration, step: self.horizon };
+            flight.position -= bend.offset(flight.time);
+            flight.velocity -= bend.velocity(flight.time);
+        }
         let grain = self.vacant.pop().unwrap_or(self.flights.len() as u32);
         if grain as usize == self.flights.len() {
             self.flights.push(flight);
             self.plans.push(NO_PLAN);
+            if !self.accelerations.is_empty() {
+                self.accelerations.push(acceleration);
+            }
         } else {
             self.flights[grain as usize] = flight;
             self.plans[grain as usize] = NO_PLAN;
+            if let Some(before) = self.accelerations.get_mut(grain as usize) {
+                *before = acceleration;
+            }
         }
-        match &mut self.cells {
-            Some(cells) if !cells.fits(flight.radius) || cells.crowded(self.flights.len() - self.vacant.len()) => {
+        match &mut self.neighbors {
+            Neighbors::Cells(cells)
+                if cells.fits(flight.radius) && !cells.crowded(self.flights.len() - self.vacant.len()) =>
+            {
+                cells.insert(grain, &self.flights[grain as usize], flight.time);
+                self.predict(grain);
+            }
+            Neighbors::Nobody => self.predict(grain),
+            _ => {
                 self.lay_out_cells(flight.time);
                 self.predict_all();
-            }
-            cells => {
-                if let Some(cells) = cells {
-                    cells.insert(grain, &flight, flight.time);
-                }
-                self.predict(grain);
             }
         }
         grain
@@ -262,7 +327,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     pub fn remove(&mut self, grain: u32) {
         self.release_partner(grain);
         self.calendar.cancel(grain);
-        if let Some(cells) = &mut self.cells {
+        if let Neighbors::Cells(cells) = &mut self.neighbors {
             cells.remove(grain);
         }
         self.flights[grain as usize] = VACANT;
@@ -273,17 +338,21 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     /// Whether a sphere at `position` with this `radius` (m) overlaps no grain at `time`.
     #[must_use]
     pub fn is_free(&self, position: Vector3<f64>, radius: f64, time: f64) -> bool {
-        let Some(cells) = &self.cells else { return true };
+        if matches!(self.neighbors, Neighbors::Nobody) {
+            return true;
+        }
         let keeps_clear = |other: u32| {
             let other = self.flight(other);
             self.domain.nearest(other.position_at(time) - position).norm() >= other.radius + radius
         };
-        if !cells.fits(radius) {
-            return self.inside().all(keeps_clear);
+        match &self.neighbors {
+            Neighbors::Cells(cells) if cells.fits(radius) => {
+                let mut free = true;
+                cells.visit_near(position, time, |other, _| free &= keeps_clear(other));
+                free
+            }
+            _ => self.inside().all(keeps_clear),
         }
-        let mut free = true;
-        cells.visit_near(position, time, |other, _| free &= keeps_clear(other));
-        free
     }
 
     /// Starts a new epoch `duration` seconds after the start of the current one: advances all grains to that moment, which is time 0
@@ -291,19 +360,116 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     ///
     /// `next_before(duration)` must have given `None`.
     pub fn start_epoch(&mut self, duration: f64, next: f64) {
-        self.horizon = next;
+        self.halt(duration);
+        self.resume(next);
+    }
+
+    /// Starts a new sub-step like an epoch. `kick` is given the surface, all grains that are nearer to each other than `reach` (m), and all
+    /// flights, as they are at that moment, to change their velocities (m/s) to those of the chords, and their accelerations (m/s²) to set; a
+    /// grain that has been taken out has the radius 0. It gives the length of the sub-step (s).
+    pub fn start_sub_step(
+        &mut self,
+        duration: f64,
+        reach: f64,
+        kick: impl FnOnce(&S, &[Touch], &mut [Flight], &mut [Vector3<f64>]) -> f64,
+    ) {
+        self.halt(duration);
+        self.accelerations.resize(self.flights.len(), Vector3::zeros());
+        let touches = self.touches(reach);
+        let next = kick(&self.surface, &touches, &mut self.flights, &mut self.accelerations);
+        self.resume(next);
+    }
+
+    /// All pairs of grains, standing at time 0, that are nearer to each other than `reach` (m), in the order of their numbers.
+    fn touches(&self, reach: f64) -> Vec<Touch> {
+        let mut touches = Vec::new();
+        for a in self.inside() {
+            let ours = self.flights[a as usize];
+            self.visit(a, |b, _| {
+                let theirs = self.flights[b as usize];
+                let apart = self.domain.nearest(theirs.position - ours.position);
+                let within = ours.radius + theirs.radius + reach;
+                if a < b && apart.norm_squared() < within * within {
+                    touches.push(Touch { a, b, apart });
+                }
+            });
+        }
+        touches.sort_unstable_by_key(|touch| (touch.a, touch.b));
+        touches
+    }
+
+    /// Calls `visit` with every grain that can soon touch `grain`, and the shift (m) of its image.
+    #[inline]
+    fn visit(&self, grain: u32, mut visit: impl FnMut(u32, Vector3<f64>)) {
+        match &self.neighbors {
+            Neighbors::Nobody => {}
+            Neighbors::Cells(cells) => cells.visit_around(grain, visit),
+            Neighbors::Lists(lists) => lists.of(grain).iter().for_each(|&(other, shift)| visit(other, shift)),
+        }
+    }
+
+    /// Advances all grains to a common moment, which is time 0 from then on.
+    fn halt(&mut self, duration: f64) {
         self.surface.start_epoch(duration);
+        if let Neighbors::Lists(lists) = &mut self.neighbors {
+            lists.age(duration);
+        }
         for grain in 0..self.flights.len() as u32 {
+            let offset = self.bend(grain).offset(duration);
             let flight = &mut self.flights[grain as usize];
             if !is_vacant(flight) {
                 *flight = flight.advanced_to(duration);
+                flight.position += offset;
                 flight.time = 0.0;
-                self.domain.wrap(&mut flight.position);
             }
         }
-        if self.cells.is_some() {
-            self.lay_out_cells(0.0);
+    }
+
+    /// Predicts everything until `horizon` (s) for grains that stand at time 0.
+    fn resume(&mut self, horizon: f64) {
+        self.horizon = horizon;
+        let lists_hold = match &self.neighbors {
+            Neighbors::Nobody => false,
+            Neighbors::Lists(lists) => self.inside().all(|grain| lists.holds(grain, self.flight(grain), horizon)),
+            Neighbors::Cells(_) => false,
+        };
+        if !lists_hold {
+            for flight in self.flights.iter_mut().filter(|flight| !is_vacant(flight)) {
+                self.domain.wrap(&mut flight.position);
+            }
+            if !matches!(self.neighbors, Neighbors::Nobody) && !self.make_lists() {
+                self.lay_out_cells(0.0);
+            }
         }
+        self.predict_all();
+    }
+
+    /// Makes neighbour lists for the coming sub-steps, where there are such and it pays.
+    fn make_lists(&mut self) -> bool {
+        if self.accelerations.is_empty() {
+            return false;
+        }
+        let (flights, largest) = self.flights_and_largest_radius();
+        let Some(skin) = skin(flights.iter(), largest, self.horizon) else { return false };
+        let Some(mut cells) = Cells::with_skin(self.domain, largest, skin, &flights, 0.0) else { return false };
+        for grain in self.inside() {
+            cells.insert(grain, self.flight(grain), 0.0);
+        }
+        let lists = Lists::new(&cells, &self.flights, skin);
+        let hold = self.inside().all(|grain| lists.holds(grain, self.flight(grain), self.horizon));
+        if hold {
+            self.neighbors = Neighbors::Lists(lists);
+        }
+        hold
+    }
+
+    /// Turns from lists to cells where a grain has become too fast for them.
+    #[cold]
+    fn leave_lists(&mut self, now: f64) {
+        for flight in self.flights.iter_mut().filter(|flight| !is_vacant(flight)) {
+            self.domain.wrap(&mut flight.position);
+        }
+        self.lay_out_cells(now);
         self.predict_all();
     }
 
@@ -318,7 +484,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         for grain in self.inside() {
             cells.insert(grain, self.flight(grain), now);
         }
-        self.cells = Some(cells);
+        self.neighbors = Neighbors::Cells(cells);
         (self.crossings, self.looks) = (0, 0);
     }
 
@@ -332,7 +498,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     #[cold]
     fn think_over_cells(&mut self, now: f64) {
         let (flights, largest) = self.flights_and_largest_radius();
-        let Some(cells) = &self.cells else { return };
+        let Neighbors::Cells(cells) = &self.neighbors else { return };
         let Some(better) = cells.better(largest, &flights, now, self.crossings, self.looks) else {
             (self.crossings, self.looks) = (0, 0);
             return;
@@ -362,9 +528,14 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         *flight = flight.advanced_to(time);
         if self.domain.periodic {
             let before = flight.position;
-            self.domain.wrap(&mut flight.position);
-            if let Some(cells) = &mut self.cells {
-                cells.wrapped(grain, flight.position - before);
+            match &mut self.neighbors {
+                Neighbors::Nobody => self.domain.wrap(&mut flight.position),
+                Neighbors::Cells(cells) => {
+                    self.domain.wrap(&mut flight.position);
+                    cells.wrapped(grain, flight.position - before);
+                }
+                // The shifts in the lists are those of the positions with which they were made.
+                Neighbors::Lists(_) => {}
             }
         }
     }
@@ -384,12 +555,12 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     /// When a grain leaves its cell.
     #[inline]
     fn crossing(&self, grain: u32) -> Event {
-        match &self.cells {
-            Some(cells) => {
+        match &self.neighbors {
+            Neighbors::Cells(cells) => {
                 let crossing = cells.crossing(grain, self.flight(grain));
                 Event { time: crossing.time, kind: Kind::Crossing, partner: u32::from(crossing.axis) }
             }
-            None => never(Kind::Crossing),
+            _ => never(Kind::Crossing),
         }
     }
 
@@ -401,7 +572,14 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         if !plan.stopped_by_surface || plan.looked_until >= until {
             return;
         }
-        match self.surface.first_contact(&self.flights[grain as usize], until) {
+        let flight = &self.flights[grain as usize];
+        let outlook = match self.accelerations.get(grain as usize) {
+            None => self.surface.first_contact(flight, until),
+            Some(&acceleration) => {
+                self.surface.first_contact_bent(flight, &Bend { acceleration, step: self.horizon }, until)
+            }
+        };
+        match outlook {
             Outlook::Hit { time, element } => {
                 plan.looked_until = f64::INFINITY;
                 if time <= plan.side.time {
@@ -415,9 +593,8 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     /// Finds the first grain that this one meets, among all that are near.
     #[inline]
     fn find_partner(&mut self, grain: u32) {
-        let Some(cells) = &self.cells else { return };
         let mut search = self.search(grain);
-        cells.visit_around(grain, |other, shift| search.consider(other, shift));
+        self.visit(grain, |other, shift| search.consider(other, shift));
         let (best, looks) = (search.best, search.looks);
         self.looks += looks;
         self.plan_pair(grain, best);
@@ -462,10 +639,10 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         }
         let axis = self.plans[grain as usize].crossing.partner as u8;
         let mut best = self.plans[grain as usize].pair;
-        if let Some(cells) = &mut self.cells {
+        if let Neighbors::Cells(cells) = &mut self.neighbors {
             let step = cells.cross(grain, &self.flights[grain as usize], axis);
             let mut search = self.search(grain);
-            if let Some(cells) = &self.cells {
+            if let Neighbors::Cells(cells) = &self.neighbors {
                 cells.visit_ahead(grain, axis, step, |other, shift| search.consider(other, shift));
             }
             best = search.best;

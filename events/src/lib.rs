@@ -37,13 +37,14 @@ pub mod contact_time;
 mod domain;
 mod encounters;
 mod flight;
+mod lists;
 mod mesh;
 mod neighbors;
 mod surface;
 
 pub use domain::Domain;
-pub use encounters::{Encounter, Encounters};
-pub use flight::Flight;
+pub use encounters::{Encounter, Encounters, Touch};
+pub use flight::{Bend, Flight};
 pub use mesh::{BadTriangle, Mesh};
 pub use neighbors::least_period;
 pub use surface::{NoSurface, Outlook, Surface, SurfaceContact};

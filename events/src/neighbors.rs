@@ -225,6 +225,12 @@ impl Cells {
         Self::empty(domain, layout, flights.len())
     }
 
+    /// The same with cells that are wider than a contact by `skin` (m).
+    pub(crate) fn with_skin(domain: Domain, largest_radius: f64, skin: f64, flights: &[Flight], now: f64) -> Option<Self> {
+        let radius = largest_radius + 0.5 * skin;
+        domain.holds(radius).then(|| Self::new(domain, radius, flights, now))
+    }
+
     fn empty(domain: Domain, layout: Layout, grains: usize) -> Self {
         Self { layout, domain, heads: vec![NOBODY; slots(grains)], places: Vec::new(), turns: Vec::new() }
     }

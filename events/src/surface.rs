@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::Flight;
+use crate::{Bend, Flight};
 
 /// What lies ahead of a flight on the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,6 +38,14 @@ pub trait Surface {
     ///
     /// A contact after `until` may be reported or not. Equal times are won by the lowest element.
     fn first_contact(&self, flight: &Flight, until: f64) -> Outlook;
+
+    /// As [`first_contact`](Self::first_contact) for a grain that is accelerated: `flight` is its chord, `bend` how it departs from it.
+    ///
+    /// Left out, the chord itself is taken, which errs by the square of the sub-step.
+    fn first_contact_bent(&self, flight: &Flight, bend: &Bend, until: f64) -> Outlook {
+        let _ = bend;
+        self.first_contact(flight, until)
+    }
 
     /// The contact between `element` and a flight that has been advanced to the moment of contact.
     fn contact(&self, element: u32, flight: &Flight) -> SurfaceContact;

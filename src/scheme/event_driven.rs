@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use impinge_events::calendar::{Calendar, Tournament};
-use impinge_events::{Domain, Encounter, Encounters, Flight, Surface};
+use impinge_events::{Domain, Encounter, Encounters, Flight, Surface, SurfaceContact, Touch};
 use nalgebra::Vector3;
 
 use super::{Broken, GrainCollision, Observer, Passage, Progress, SurfaceHit};
@@ -40,6 +40,14 @@ const COLLAPSE_HITS_IN_LINE: u32 = 64;
 const COLLAPSE_TIME: f64 = 1.0 / (1u64 << 22) as f64;
 /// Speed over that of the fastest grain below which a sequence of hits has collapsed.
 const COLLAPSED: f64 = 1e-9;
+/// Overlap over the smaller radius above which a run with forces is wrong and stops. Within a sub-step grains of unequal acceleration follow
+/// their chords, and may overlap by ¼ of the way that the force pulls them together in half a sub-step.
+pub const LARGEST_OVERLAP_WITH_FORCES: f64 = 1e-3;
+/// A contact under force whose approach speed is below this part of what the force gives in a sub-step has come to rest. A bouncing grain then
+/// comes to rest early by this part of a sub-step over 1 - e.
+const STICKING: f64 = 1e-8;
+/// What is taken off an acceleration into a contact at rest, more than itself: enough that rounding leaves none of it.
+const RELIEF: f64 = 1.0 + 1.0 / (1u64 << 48) as f64;
 /// The law of a contact in a collapse.
 const ELASTIC: ContactLaw = ContactLaw { restitution: 1.0, friction: Friction::Smooth };
 /// Encounters between two looks at the watch (progress, Ctrl-C).
@@ -106,6 +114,19 @@ impl Row {
     }
 }
 
+/// What the treatment of contacts at rest did within sub-steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Held {
+    /// Impulse of the surface on grains, N s; counted in the velocities of chords.
+    pub impulse_surface: Vector3<f64>,
+    /// Kinetic energy taken from grains at contacts with each other, J; negative where some was given.
+    pub dissipated_grain: f64,
+    /// The same at contacts with the surface.
+    pub dissipated_surface: f64,
+    /// How many contacts were held.
+    pub contacts: u64,
+}
+
 /// Grains, what they meet, and the laws of their meetings; advanced from event to event.
 #[derive(Clone, Debug)]
 pub struct EventDriven<S: Surface, C: Calendar = Tournament> {
@@ -126,6 +147,14 @@ pub struct EventDriven<S: Surface, C: Calendar = Tournament> {
     smallest: f64,
     /// Whether a grain has become too fast for the epoch.
     outrun: bool,
+    /// Hits within this time (s) are in a row.
+    in_a_row: f64,
+    /// Whether forces act: then the epoch is a sub-step, and somebody else says when the next one starts.
+    forces: bool,
+    /// Acceleration of a grain that enters, until the next sub-step, m/s².
+    entry_acceleration: Vector3<f64>,
+    /// What contacts at rest did since it was last asked.
+    held: Held,
     /// Simulated time that has been reached, s.
     time: f64,
     entered: u64,
@@ -158,6 +187,10 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             fastest: 0.0,
             smallest: f64::INFINITY,
             outrun: false,
+            in_a_row: 0.0,
+            forces: false,
+            entry_acceleration: Vector3::zeros(),
+            held: Held::default(),
             time: start,
             entered,
             collisions: 0,
@@ -189,6 +222,33 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
 
     /// Starts an epoch `after` seconds into the current one, and chooses its length by the fastest and the smallest grain.
     fn start_epoch(&mut self, after: f64) {
+        let length = self.natural_epoch(after);
+        self.encounters.start_epoch(after, length);
+        self.begin(after, length);
+    }
+
+    /// Starts a sub-step at the time that has been reached; grains that enter in it are accelerated at `entering` (m/s²). `kick` is given what
+    /// [`Encounters::start_sub_step`] gives it, and what grains carry; it gives the length of the sub-step (s).
+    pub fn start_sub_step(
+        &mut self,
+        reach: f64,
+        entering: Vector3<f64>,
+        kick: impl FnOnce(&S, &[Touch], &[Grain], &mut [Flight], &mut [Vector3<f64>]) -> f64,
+    ) {
+        self.entry_acceleration = entering;
+        let after = self.time - self.epoch_start;
+        self.natural_epoch(after);
+        self.forces = true;
+        let (grains, mut length) = (&self.grains, 0.0);
+        self.encounters.start_sub_step(after, reach, |surface, touches, flights, accelerations| {
+            length = kick(surface, touches, grains, flights, accelerations);
+            length
+        });
+        self.begin(after, length);
+    }
+
+    /// Length of an epoch (s) that starts `after` seconds into the current one without forces.
+    fn natural_epoch(&mut self, after: f64) -> f64 {
         self.fastest = self.encounters.surface().speed();
         self.smallest = f64::INFINITY;
         for grain in self.encounters.inside() {
@@ -196,14 +256,24 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             self.fastest = self.fastest.max(flight.velocity.amax());
             self.smallest = self.smallest.min(flight.radius);
         }
+        let length = epoch_length(self.smallest, self.fastest, self.epoch_start + after);
+        self.in_a_row = COLLAPSE_TIME * length;
+        length
+    }
+
+    fn begin(&mut self, after: f64, length: f64) {
         self.epoch_start += after;
-        self.epoch = epoch_length(self.smallest, self.fastest, self.epoch_start);
-        self.encounters.start_epoch(after, self.epoch);
+        self.epoch = length;
         self.outrun = false;
         for row in &mut self.rows {
             row.latest -= after;
         }
         (self.mark, self.since_mark) = (0.0, 0);
+    }
+
+    /// What contacts at rest did since this was last asked.
+    pub fn take_held(&mut self) -> Held {
+        std::mem::take(&mut self.held)
     }
 
     /// Resolves all events up to simulated time `end` (s). When and how often it is called changes nothing of what happens.
@@ -221,7 +291,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             // The end of the epoch as it is known to `encounters`, free of the rounding of `epoch_end`.
             let until = if end < epoch_end { end - self.epoch_start } else { self.epoch };
             let Some((time, encounter)) = self.encounters.next_before(until) else {
-                if end <= epoch_end {
+                if end <= epoch_end || self.forces {
                     break;
                 }
                 self.start_epoch(self.epoch);
@@ -234,7 +304,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
                 Encounter::Exit { grain } => self.take_out(Passage::Left, time, grain, observer),
             }
             let now = self.epoch_start + time;
-            if self.outrun {
+            if self.outrun && !self.forces {
                 self.start_epoch(time);
             }
             self.since_watch += 1;
@@ -280,7 +350,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     /// Notes a hit of a grain with `partner` at `approach` (m/s) and tells whether the grain is part of a collapse.
     #[inline]
     fn is_collapsing(&mut self, time: f64, grain: u32, partner: u32, approach: f64) -> bool {
-        let within = COLLAPSE_TIME * self.epoch;
+        let within = self.in_a_row;
         self.rows.get_mut(grain as usize).is_some_and(|row| row.note(time, within, partner, approach))
     }
 
@@ -289,7 +359,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         // The lower id is the first of the two: slots are used again, ids are not.
         let (a, b) = if self.grains[a as usize].id < self.grains[b as usize].id { (a, b) } else { (b, a) };
         let (first, second) = (self.body(a), self.body(b));
-        let (flight_a, flight_b) = (*self.encounters.flight(a), *self.encounters.flight(b));
+        let (flight_a, flight_b) = (self.true_flight(a), self.true_flight(b));
         let apart = self.domain.nearest(flight_b.position - flight_a.position);
         let distance = apart.norm();
         let normal = apart / distance;
@@ -300,9 +370,12 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         if shielded {
             let (fresh, other) = if self.grains[a as usize].hits == 0 { (a, b) } else { (b, a) };
             self.take_out(Passage::Removed, time, fresh, observer);
-            let onwards = self.encounters.flight(other).velocity;
+            let onwards = self.true_flight(other).velocity;
             self.deflect(&[(other, onwards)]);
             return Ok(());
+        }
+        if self.forces && self.pair_rests(a, b, &first, &second, normal) {
+            return self.hold_pair(time, [a, b], [first, second], normal, overlap_over_radius);
         }
         let mut contact = resolve_pair(&self.laws.grain, &first, &second, normal);
         let mut withheld = 0.0;
@@ -314,7 +387,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         }
         // Where rounding has turned the slightest graze into none, both fly on.
         if contact.impulse.normal == 0.0 {
-            self.encounters.deflect(&[(a, first.velocity), (b, second.velocity)]);
+            self.deflect(&[(a, first.velocity), (b, second.velocity)]);
             return Ok(());
         }
         let [after_a, after_b] = contact.after;
@@ -341,7 +414,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     /// A grain touches the surface.
     fn hit(&mut self, time: f64, grain: u32, element: u32, observer: &mut impl Observer) -> Result<(), Broken> {
         let before = self.body(grain);
-        let flight = *self.encounters.flight(grain);
+        let flight = self.true_flight(grain);
         let mut contact = self.encounters.surface().contact(element, &flight);
         let id = self.grains[grain as usize].id;
         if self.domain.planar && contact.normal.y != 0.0 {
@@ -350,6 +423,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             }
             contact.normal = Vector3::new(contact.normal.x, 0.0, contact.normal.z).normalize();
         }
+        if self.forces && self.rests_on_surface(grain, &before, &contact) {
+            return self.hold_on_surface(time, grain, &before, &contact);
+        }
         let mut resolved = resolve_surface(&self.laws.surface, &before, contact.normal, contact.velocity);
         let mut withheld = 0.0;
         if self.is_collapsing(time, grain, SURFACE, resolved.approach_speed) {
@@ -357,7 +433,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             resolved = resolve_surface(&ELASTIC, &before, contact.normal, contact.velocity);
         }
         if resolved.impulse.normal == 0.0 {
-            self.encounters.deflect(&[(grain, before.velocity)]);
+            self.deflect(&[(grain, before.velocity)]);
             return Ok(());
         }
         let overlap_over_radius = -contact.gap / before.radius;
@@ -395,14 +471,96 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         Ok(())
     }
 
+    /// Whether two grains that touch are at rest against each other: their chords approach, and they themselves do not, or hardly.
+    fn pair_rests(&self, a: u32, b: u32, first: &Body, second: &Body, normal: Vector3<f64>) -> bool {
+        let approach = (first.velocity - second.velocity).dot(&normal);
+        let [bend_a, bend_b] = [a, b].map(|grain| self.encounters.bend(grain));
+        let pull = (bend_a.acceleration - bend_b.acceleration).dot(&normal).abs();
+        approach <= STICKING * pull * self.epoch
+    }
+
+    /// Two grains at rest against each other stay so until the end of the sub-step: what their chords approach is taken away by an impulse.
+    fn hold_pair(
+        &mut self,
+        time: f64,
+        grains: [u32; 2],
+        bodies: [Body; 2],
+        normal: Vector3<f64>,
+        overlap_over_radius: f64,
+    ) -> Result<(), Broken> {
+        let ids = grains.map(|grain| self.grains[grain as usize].id);
+        let [first, second] = bodies;
+        let chords = grains.map(|grain| self.encounters.flight(grain).velocity);
+        let approach = (chords[0] - chords[1]).dot(&normal).max(0.0);
+        let impulse = normal * (approach * first.mass * second.mass / (first.mass + second.mass));
+        let after = [first.velocity - impulse / first.mass, second.velocity + impulse / second.mass];
+        self.check(time, &ids, overlap_over_radius, &after)?;
+        self.held.dissipated_grain += impulse.dot(&(first.velocity - second.velocity + (after[0] - after[1]))) * 0.5;
+        self.held.contacts += 1;
+        self.deflect(&[(grains[0], after[0]), (grains[1], after[1])]);
+        Ok(())
+    }
+
+    /// Whether a grain that touches the surface is at rest against it.
+    fn rests_on_surface(&self, grain: u32, before: &Body, contact: &SurfaceContact) -> bool {
+        let approach = -(before.velocity - contact.velocity).dot(&contact.normal);
+        let pull = self.encounters.bend(grain).acceleration.dot(&contact.normal).abs();
+        approach <= STICKING * pull * self.epoch
+    }
+
+    /// A grain at rest against the surface stays so until the end of the sub-step: the surface carries what pulls it there.
+    fn hold_on_surface(
+        &mut self,
+        time: f64,
+        grain: u32,
+        before: &Body,
+        contact: &SurfaceContact,
+    ) -> Result<(), Broken> {
+        let id = self.grains[grain as usize].id;
+        let rate = (before.velocity - contact.velocity).dot(&contact.normal);
+        let after = before.velocity - contact.normal * rate.min(0.0);
+        self.check(time, &[id], -contact.gap / before.radius, &[after])?;
+        let chord = self.encounters.flight(grain).velocity;
+        let acceleration = self.encounters.bend(grain).acceleration;
+        let pull = acceleration.dot(&contact.normal).min(0.0);
+        self.encounters.accelerate(grain, acceleration - contact.normal * (pull * RELIEF));
+        self.deflect(&[(grain, after)]);
+        self.held.impulse_surface += (self.encounters.flight(grain).velocity - chord) * before.mass;
+        self.held.dissipated_surface += 0.5 * before.mass * (before.velocity.norm_squared() - after.norm_squared());
+        self.held.contacts += 1;
+        Ok(())
+    }
+
+    /// Gives grains that have just met something their new velocities (m/s).
     #[inline]
-    fn deflect(&mut self, grains: &[(u32, Vector3<f64>)]) {
+    fn deflect<const N: usize>(&mut self, grains: &[(u32, Vector3<f64>); N]) {
         self.outrun |= grains.iter().any(|(_, velocity)| velocity.amax() > OUTRUN * self.fastest);
-        self.encounters.deflect(grains);
+        if self.forces {
+            let chord = |&(grain, velocity): &(u32, Vector3<f64>)| {
+                let time = self.encounters.flight(grain).time;
+                (grain, velocity - self.encounters.bend(grain).velocity(time))
+            };
+            let chords = grains.each_ref().map(chord);
+            self.encounters.deflect(&chords);
+        } else {
+            self.encounters.deflect(grains);
+        }
+    }
+
+    /// The flight of a grain as it is at its local time: without forces the stored one.
+    #[inline]
+    fn true_flight(&self, grain: u32) -> Flight {
+        let mut flight = *self.encounters.flight(grain);
+        if self.forces {
+            let bend = self.encounters.bend(grain);
+            flight.position += bend.offset(flight.time);
+            flight.velocity += bend.velocity(flight.time);
+        }
+        flight
     }
 
     fn take_out(&mut self, passage: Passage, time: f64, grain: u32, observer: &mut impl Observer) {
-        let flight = *self.encounters.flight(grain);
+        let flight = self.true_flight(grain);
         observer.passage(passage, self.epoch_start + time, &flight, &self.grains[grain as usize]);
         self.encounters.remove(grain);
     }
@@ -412,7 +570,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let flight = Flight { time: time - self.epoch_start, ..flight(new) };
         let grain = carried(new, self.entered);
         self.entered += 1;
-        let slot = self.encounters.insert(flight) as usize;
+        let slot = self.encounters.insert(flight, self.entry_acceleration) as usize;
         if slot == self.grains.len() {
             self.grains.push(grain);
             if self.laws.collapse == Collapse::Elastic {
@@ -440,7 +598,13 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let mut slots: Vec<u32> = self.encounters.inside().collect();
         slots.sort_unstable_by_key(|&slot| self.grains[slot as usize].id);
         let at = |&slot: &u32| {
-            let mut flight = self.encounters.flight(slot).advanced_to(time - self.epoch_start);
+            let now = time - self.epoch_start;
+            let mut flight = self.encounters.flight(slot).advanced_to(now);
+            if self.forces {
+                let bend = self.encounters.bend(slot);
+                flight.position += bend.offset(now);
+                flight.velocity += bend.velocity(now);
+            }
             flight.time = 0.0;
             self.domain.wrap(&mut flight.position);
             flight
@@ -452,7 +616,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
 
     #[inline]
     fn body(&self, grain: u32) -> Body {
-        let flight = self.encounters.flight(grain);
+        let flight = self.true_flight(grain);
         let Grain { mass, spin, .. } = self.grains[grain as usize];
         Body { mass, radius: flight.radius, velocity: flight.velocity, spin }
     }
@@ -461,10 +625,11 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     #[inline]
     fn check(&self, time: f64, ids: &[u64], overlap: f64, velocities: &[Vector3<f64>]) -> Result<(), Broken> {
         let numbers = velocities.iter().all(|velocity| velocity.norm_squared().is_finite());
-        if overlap <= LARGEST_OVERLAP && numbers {
+        let allowed = if self.forces { LARGEST_OVERLAP_WITH_FORCES } else { LARGEST_OVERLAP };
+        if overlap <= allowed && numbers {
             return Ok(());
         }
-        Err(broken(self.epoch_start + time, ids, overlap, numbers))
+        Err(broken(self.epoch_start + time, ids, overlap, allowed, numbers))
     }
 }
 
@@ -476,9 +641,9 @@ fn epoch_length(radius: f64, speed: f64, start: f64) -> f64 {
 }
 
 #[cold]
-fn broken(time: f64, ids: &[u64], overlap: f64, numbers: bool) -> Broken {
+fn broken(time: f64, ids: &[u64], overlap: f64, allowed: f64, numbers: bool) -> Broken {
     let grains = ids.to_vec();
-    if numbers { Broken::Overlap { time, grains, overlap } } else { Broken::NotANumber { time, grains } }
+    if numbers { Broken::Overlap { time, grains, overlap, allowed } } else { Broken::NotANumber { time, grains } }
 }
 
 fn flight(grain: &NewGrain) -> Flight {

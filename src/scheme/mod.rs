@@ -27,7 +27,7 @@ pub struct Progress {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Broken {
     /// Grains overlap each other or the surface by more than rounding can explain.
-    #[error("at t = {time} s {} by {overlap:.3e} radii (allowed: {LARGEST_OVERLAP:.0e})", overlapping(grains))]
+    #[error("at t = {time} s {} by {overlap:.3e} radii (allowed: {allowed:.0e})", overlapping(grains))]
     Overlap {
         /// Simulated time, s.
         time: f64,
@@ -35,6 +35,8 @@ pub enum Broken {
         grains: Vec<u64>,
         /// Overlap over the smaller radius.
         overlap: f64,
+        /// The most that is allowed.
+        allowed: f64,
     },
     /// Collisions without end, while time stands still.
     #[error("at t = {time} s {} jammed: {encounters} collisions and no time goes by", are(grains))]

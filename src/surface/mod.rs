@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use impinge_events::contact_time::{APPROACH_ROUNDING, Sweep, sphere_plane};
-use impinge_events::{Flight, Outlook, SurfaceContact};
+use impinge_events::contact_time::{APPROACH_ROUNDING, Sweep, sphere_plane, sphere_plane_bent};
+use impinge_events::{Bend, Flight, Outlook, SurfaceContact};
 use nalgebra::Vector3;
 
 use crate::scene::{self, Invalid, Vec3};
@@ -167,19 +167,14 @@ impl Surface {
         self.parts.partition_point(|part| part.first_element <= element) - 1
     }
 
-    fn part(&self, element: u32) -> &Part {
-        &self.parts[self.number_of(element)]
-    }
-}
-
-impl impinge_events::Surface for Surface {
+    /// The first of the contacts that `look` finds on each part until a given time (s).
     #[inline]
-    fn first_contact(&self, flight: &Flight, until: f64) -> Outlook {
+    fn first(&self, until: f64, look: impl Fn(&Part, f64) -> Outlook) -> Outlook {
         let mut clear = f64::INFINITY;
         let mut hit: Option<(f64, u32)> = None;
         for part in &self.parts {
             let end = hit.map_or(until, |(time, _)| time.min(until));
-            match part.first_contact(flight, end) {
+            match look(part, end) {
                 // Parts come in the order of their elements, so of equal times the lowest element wins.
                 Outlook::Hit { time, element } if hit.is_none_or(|(first, _)| time < first) => {
                     hit = Some((time, element));
@@ -192,6 +187,21 @@ impl impinge_events::Surface for Surface {
             Some((time, element)) if time <= clear => Outlook::Hit { time, element },
             _ => Outlook::ClearUntil(clear),
         }
+    }
+
+    fn part(&self, element: u32) -> &Part {
+        &self.parts[self.number_of(element)]
+    }
+}
+
+impl impinge_events::Surface for Surface {
+    #[inline]
+    fn first_contact(&self, flight: &Flight, until: f64) -> Outlook {
+        self.first(until, |part, end| part.first_contact(flight, end))
+    }
+
+    fn first_contact_bent(&self, flight: &Flight, bend: &Bend, until: f64) -> Outlook {
+        self.first(until, |part, end| part.first_contact_bent(flight, bend, end))
     }
 
     fn contact(&self, element: u32, flight: &Flight) -> SurfaceContact {
@@ -231,6 +241,19 @@ impl Part {
                 Outlook::Hit { time, element } => Outlook::Hit { time, element: self.first_element + element },
                 clear @ Outlook::ClearUntil(_) => clear,
             },
+        }
+    }
+
+    /// Exact for a plane; of a mesh the chord is taken.
+    fn first_contact_bent(&self, flight: &Flight, bend: &Bend, until: f64) -> Outlook {
+        match &self.shape {
+            Shape::Plane { point, normal } => {
+                match sphere_plane_bent(&self.seen(flight), bend, *point, *normal) {
+                    Some(time) => Outlook::Hit { time, element: self.first_element },
+                    None => Outlook::ClearUntil(f64::INFINITY),
+                }
+            }
+            Shape::Mesh(_) => self.first_contact(flight, until),
         }
     }
 

@@ -6,7 +6,7 @@ mod sphere_sphere;
 mod sphere_triangle;
 mod wide;
 
-pub use sphere_plane::sphere_plane;
+pub use sphere_plane::{sphere_plane, sphere_plane_bent};
 pub use sphere_sphere::{sphere_sphere, spheres_may_touch};
 pub use sphere_triangle::{Edge, Face, Sweep, sphere_corner, sphere_triangle};
 

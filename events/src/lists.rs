@@ -1,0 +1,99 @@
+//! Who can meet whom within several sub-steps: neighbour lists that drift with the stream.
+//!
+//! The list of a grain names all grains that were nearer than the contact distance and a skin when it was made. As long as no grain has moved by more
+//! than half the skin, seen from a frame that drifts with the stream, nobody else can touch it. So one list serves many short sub-steps, in
+//! which cells would be laid out anew each time.
+//!
+//! Lists are bookkeeping, as cells are: they cannot change a bit of a prediction.
+
+use nalgebra::Vector3;
+
+use crate::Flight;
+use crate::neighbors::Cells;
+
+/// Sub-steps that a list should serve, by the fastest grain: more make longer lists.
+const SUB_STEPS: f64 = 12.0;
+/// Widest skin, in radii of the largest grain: beyond it a list holds so many grains that cells are better.
+const WIDEST_SKIN: f64 = 1.0;
+
+/// The lists of all grains.
+#[derive(Clone, Debug)]
+pub(crate) struct Lists {
+    /// The list of grain k is from `starts[k]` to `starts[k + 1]`.
+    starts: Vec<u32>,
+    others: Vec<(u32, Vector3<f64>)>,
+    /// Where each grain was, m.
+    anchors: Vec<Vector3<f64>>,
+    /// Velocity of the frame, m/s.
+    drift: Vector3<f64>,
+    /// How far a grain may move in that frame, m.
+    room: f64,
+    /// Since when, s.
+    age: f64,
+}
+
+/// How fast a stream moves as a whole (m/s), and how fast its fastest grain moves in that frame.
+fn stream<'a>(flights: impl Iterator<Item = &'a Flight> + Clone) -> (Vector3<f64>, f64) {
+    let count = flights.clone().count().max(1) as f64;
+    let drift = flights.clone().map(|flight| flight.velocity).sum::<Vector3<f64>>() / count;
+    (drift, flights.map(|flight| (flight.velocity - drift).norm_squared()).fold(0.0, f64::max).sqrt())
+}
+
+/// The skin (m) for grains of radius `largest` at most that move so for sub-steps of length `step` (s); `None` where cells are better.
+pub(crate) fn skin<'a>(flights: impl Iterator<Item = &'a Flight> + Clone, largest: f64, step: f64) -> Option<f64> {
+    let (_, fastest) = stream(flights);
+    // Grains that hardly move get a list that lasts.
+    let skin = (2.0 * fastest * step * SUB_STEPS).max(0.1 * largest);
+    let widest = WIDEST_SKIN * largest;
+    // It must last a few sub-steps, or it is made in vain.
+    (skin <= 4.0 * widest).then_some(skin.min(widest))
+}
+
+impl Lists {
+    /// Lists with the given skin (m) for flights at time 0; vacant ones have the radius 0. `cells` are wider than contact and skin.
+    pub(crate) fn new(cells: &Cells, flights: &[Flight], skin: f64) -> Self {
+        let (drift, _) = stream(flights.iter().filter(|flight| flight.radius > 0.0));
+        let mut lists = Self {
+            starts: vec![0],
+            others: Vec::new(),
+            anchors: flights.iter().map(|flight| flight.position).collect(),
+            drift,
+            room: 0.5 * skin,
+            age: 0.0,
+        };
+        for (grain, flight) in flights.iter().enumerate() {
+            if flight.radius > 0.0 {
+                cells.visit_around(grain as u32, |other, shift| {
+                    let theirs = &flights[other as usize];
+                    let reach = flight.radius + theirs.radius + skin;
+                    if (theirs.position + shift - flight.position).norm_squared() < reach * reach {
+                        lists.others.push((other, shift));
+                    }
+                });
+            }
+            lists.starts.push(lists.others.len() as u32);
+        }
+        lists
+    }
+
+    /// Whether a flight keeps to its room until `until` (s since the start of the sub-step).
+    #[inline]
+    pub(crate) fn holds(&self, grain: u32, flight: &Flight, until: f64) -> bool {
+        let moved = flight.position_at(until) - self.anchors[grain as usize] - self.drift * (self.age + until);
+        let now = flight.position - self.anchors[grain as usize] - self.drift * (self.age + flight.time);
+        // A straight line is nowhere farther away than at its ends.
+        moved.norm_squared().max(now.norm_squared()) < self.room * self.room
+    }
+
+    /// Goes on by a sub-step of this length (s).
+    pub(crate) fn age(&mut self, step: f64) {
+        self.age += step;
+    }
+
+    /// The grains that `grain` can touch, and the shift (m) of their images.
+    #[inline]
+    pub(crate) fn of(&self, grain: u32) -> &[(u32, Vector3<f64>)] {
+        let grain = grain as usize;
+        &self.others[self.starts[grain] as usize..self.starts[grain + 1] as usize]
+    }
+}
