@@ -138,7 +138,11 @@ impl Layout {
                 size[axis] = extent[axis] / f64::from(period[axis]);
             }
         }
-        let extent = if domain.periodic { period.zip_map(&domain.extent(), |n, length| if n > 0 { length } else { 0.0 }) } else { Vector3::zeros() };
+        let extent = if domain.periodic {
+            period.zip_map(&domain.extent(), |n, length| if n > 0 { length } else { 0.0 })
+        } else {
+            Vector3::zeros()
+        };
         Self { size, period, extent, corner, drift, growth, born: now }
     }
 

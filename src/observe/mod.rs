@@ -17,12 +17,14 @@
 
 #[cfg(test)]
 pub(crate) mod fake_jet;
+mod forces;
 mod history;
 mod ledger;
 mod sum;
 mod surface_energy;
 mod surface_map;
 
+pub use forces::Forces;
 pub use history::{History, Moment};
 pub use ledger::{Amounts, Counts, Ledger};
 pub use sum::{Sum, VectorSum};

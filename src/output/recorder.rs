@@ -12,7 +12,7 @@ use super::{Error, EventTable, Folder, Summary, vtk};
 use crate::grains::{Grain, Snapshot};
 use crate::observe::{History, Ledger, SurfaceEnergy, SurfaceMap, SurfaceShape};
 use crate::scene::{Radius, Scene};
-use crate::scheme::{GrainCollision, Observer, Passage, SurfaceHit};
+use crate::scheme::{GrainCollision, Kick, Observer, Passage, Rest, SurfaceHit};
 
 /// What the observers of a run cannot know.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -216,6 +216,14 @@ impl Observer for Recorder {
         if let Some(events) = &mut self.events {
             events.surface_hit(hit);
         }
+    }
+
+    fn kick(&mut self, kick: &Kick) {
+        self.ledger.kick(kick);
+    }
+
+    fn rest(&mut self, rest: &Rest) {
+        self.ledger.rest(rest);
     }
 
     fn passage(&mut self, passage: Passage, time: f64, flight: &Flight, grain: &Grain) {

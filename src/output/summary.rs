@@ -95,6 +95,9 @@ pub struct Collisions {
 
 /// Where the kinetic energy went, J:
 /// initial + entered + work_surface = left + removed + final + dissipated_grain + dissipated_surface + residual.
+///
+/// Where forces act, work_gravity, rest_added and what the near field gave stand on the left too: potential_initial - potential_final, or
+/// work_near_field where grains entered or left during the run or no potential energy was summed.
 #[derive(Clone, Debug, Serialize)]
 pub struct Energy {
     /// Of the grains at the start.
@@ -116,10 +119,30 @@ pub struct Energy {
     pub withheld: f64,
     /// Work of moving surfaces on grains.
     pub work_surface: f64,
+    /// What forces and resting contacts did; absent where no force acts.
+    #[serde(flatten)]
+    pub forces: Option<ForceEnergy>,
     /// What is not accounted for.
     pub residual: f64,
-    /// The residual over the energy brought in.
+    /// The residual over the energy brought in, or over the largest energy that grains had or got from a force, if that is more.
     pub residual_relative: f64,
+}
+
+/// What forces and resting contacts did, J.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct ForceEnergy {
+    /// Potential energy of the near field at the start; absent where it was not summed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub potential_initial: Option<f64>,
+    /// Potential energy of the near field at the end; absent where it was not summed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub potential_final: Option<f64>,
+    /// Kinetic energy that the near field gave to grains.
+    pub work_near_field: f64,
+    /// Work of gravity on grains.
+    pub work_gravity: f64,
+    /// Added by the treatment of resting contacts.
+    pub rest_added: f64,
 }
 
 /// Energy (J) and impulse (N s) to the surface.
@@ -174,6 +197,9 @@ pub struct Momentum {
     pub final_: [f64; 3],
     /// Given to grains by the surface.
     pub surface: [f64; 3],
+    /// Given to grains by gravity; absent where no force acts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gravity: Option<[f64; 3]>,
 }
 
 /// Where the mass went, kg.
@@ -232,6 +258,13 @@ impl Summary {
                 dissipated_surface: ledger.dissipated_surface(),
                 withheld: ledger.withheld(),
                 work_surface: ledger.work_surface(),
+                forces: ledger.forces().map(|forces| ForceEnergy {
+                    potential_initial: forces.potential_initial(),
+                    potential_final: forces.potential_final(),
+                    work_near_field: forces.work_near_field(),
+                    work_gravity: forces.work_gravity(),
+                    rest_added: forces.rest_added(),
+                }),
                 residual: ledger.energy_residual(),
                 residual_relative: ledger.relative_energy_residual(),
             },
@@ -243,6 +276,7 @@ impl Summary {
                 removed: removed.momentum().into(),
                 final_: inside.momentum().into(),
                 surface: ledger.surface_impulse().into(),
+                gravity: ledger.forces().map(|forces| forces.impulse_gravity().into()),
             },
             momentum_residual: ledger.relative_momentum_residual(),
             mass: Mass {
@@ -333,15 +367,21 @@ impl Summary {
 
     fn energies(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let energy = &self.energy;
+        let forces = energy.forces.as_ref();
         let lines = [
             ("brought in, E0", self.brought_in()),
             ("work of moving surfaces", energy.work_surface),
+            ("work of gravity", forces.map_or(0.0, |forces| forces.work_gravity)),
+            ("work of the near field", forces.map_or(0.0, |forces| forces.work_near_field)),
+            ("added to resting contacts", forces.map_or(0.0, |forces| forces.rest_added)),
             ("dissipated between grains", energy.dissipated_grain),
             ("dissipated at the surface", energy.dissipated_surface),
             ("carried out of the domain", energy.left),
             ("of removed grains", energy.removed),
             ("inside at the end", energy.final_),
             ("withheld in collapses", energy.withheld),
+            ("potential at the start", forces.and_then(|forces| forces.potential_initial).unwrap_or(0.0)),
+            ("potential at the end", forces.and_then(|forces| forces.potential_final).unwrap_or(0.0)),
         ];
         writeln!(f, "energy")?;
         lines.into_iter().filter(|line| line.1 != 0.0).try_for_each(|line| self.energy_line(f, line.0, line.1, ""))?;
@@ -369,7 +409,8 @@ impl Summary {
     fn quality(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let small = |value: f64| if value == 0.0 { "0".to_owned() } else { format!("{:.1e}", value.abs()) };
         writeln!(f, "not accounted for")?;
-        writeln!(f, "  {:<26}{:>12} of E0", "energy", small(self.energy.residual_relative))?;
+        let scale = if self.energy.forces.is_some() { "the largest energy" } else { "E0" };
+        writeln!(f, "  {:<26}{:>12} of {scale}", "energy", small(self.energy.residual_relative))?;
         writeln!(f, "  {:<26}{:>12} of the sum of m |v|", "momentum", small(self.momentum_residual))?;
         writeln!(f, "  {:<26}{:>12} of the radius", "deepest overlap", small(self.max_overlap_over_radius))?;
         let [cpu, wall] = [self.cpu_seconds, self.wall_seconds].map(|seconds| quantity(seconds, "s"));
@@ -445,8 +486,12 @@ pub(super) fn grouped(count: u64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+
     use super::*;
+    use crate::grains::Snapshot;
     use crate::observe::fake_jet::FakeJet;
+    use crate::scheme::{Kick, Observer as _, Rest};
 
     fn summary(grains: u64) -> Summary {
         let mut watched = (Ledger::default(), SurfaceEnergy::default());
@@ -482,6 +527,38 @@ mod tests {
             json["surface"]["by_order"].as_array().unwrap().iter().map(|order| order["energy"].as_f64().unwrap()).sum();
         approx::assert_relative_eq!(orders, number("/surface/energy_all_hits"), max_relative = 1e-14);
         assert!(number("/surface/energy_first_hits") < orders && number("/surface/impulse_normal") > 0.0);
+    }
+
+    #[test]
+    fn forces_have_keys_only_where_they_act() {
+        let json = |ledger: &Ledger| {
+            let scene = crate::output::recorder::tests::scene();
+            let summary = Summary::new(&scene, ledger, &SurfaceEnergy::default(), 0.0, &Outcome::default());
+            (serde_json::to_value(&summary).unwrap(), summary.to_string())
+        };
+        let mut ledger = Ledger::default();
+        ledger.sample(&Snapshot { time: 0.0, flights: &[], grains: &[] });
+        const KEYS: [&str; 5] =
+            ["potential_initial", "potential_final", "work_near_field", "work_gravity", "rest_added"];
+        let (free, text) = json(&ledger);
+        assert!(KEYS.iter().all(|key| free["energy"].get(key).is_none()) && free["momentum"].get("gravity").is_none());
+        assert!(!text.contains("potential") && !text.contains("gravity"), "{text}");
+
+        ledger.kick(&Kick { work_gravity: 2.0, impulse_gravity: Vector3::new(0.0, 0.0, -3.0), ..Kick::default() });
+        let (falling, _) = json(&ledger);
+        let energy = |key: &str| falling["energy"].get(key).and_then(serde_json::Value::as_f64);
+        assert_eq!(KEYS.map(energy), [None, None, Some(0.0), Some(2.0), Some(0.0)]);
+        assert_eq!(falling["momentum"]["gravity"], serde_json::json!([0.0, 0.0, -3.0]));
+
+        ledger.kick(&Kick { potential_energy: Some(-1.5), ..Kick::default() });
+        ledger.kick(&Kick { potential_energy: Some(-2.5), work_near_field: 1.0, ..Kick::default() });
+        ledger.rest(&Rest { added: 0.25, ..Rest::default() });
+        let (attracted, text) = json(&ledger);
+        let energy = |key: &str| attracted["energy"].get(key).and_then(serde_json::Value::as_f64);
+        assert_eq!(KEYS.map(energy), [Some(-1.5), Some(-2.5), Some(1.0), Some(2.0), Some(0.25)]);
+        for line in ["work of gravity", "work of the near field", "added to resting", "potential at the start"] {
+            assert!(text.contains(line), "{text}");
+        }
     }
 
     #[test]

@@ -154,6 +154,46 @@ impl SurfaceHit {
     }
 }
 
+/// What forces did to all grains together since the last kick, as observers see it: one a sub-step, none where no force acts.
+///
+/// Works and impulses are those that the scheme applied, in kicks, in their synchronisation at a collision and in contacts of finite
+/// duration alike, so that kinetic energy and momentum are accounted for to round-off. The potential energy is that of the grains at their
+/// places now: against it the ledger sees what the sub-stepping itself gains or loses.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Kick {
+    /// Simulated time, s.
+    pub time: f64,
+    /// Work of gravity on the grains since the last kick, J.
+    pub work_gravity: f64,
+    /// Momentum that gravity gave them since the last kick, N s.
+    pub impulse_gravity: Vector3<f64>,
+    /// Potential energy of the near field at `time`, J, where it was summed. What bounds a run counts most: the first one given before or
+    /// after the first sample is the initial one, the latest the final one.
+    pub potential_energy: Option<f64>,
+    /// Momentum that the near field gave to all grains together since the last kick, N s: zero up to round-off, as it acts in pairs (up to its
+    /// tolerance where a tree sums it).
+    pub impulse_near_field: Vector3<f64>,
+    /// Kinetic energy that the near field gave to the grains since the last kick, J.
+    pub work_near_field: f64,
+}
+
+/// What resting contacts did since the last kick, as observers see it; nothing is reported where no grain rests.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Rest {
+    /// Simulated time, s.
+    pub time: f64,
+    /// Momentum that grains at rest on the surface got from it since the last kick, N s.
+    pub impulse_surface: Vector3<f64>,
+    /// Kinetic energy dissipated in resting contacts between grains since the last kick, J.
+    pub dissipated_grain: f64,
+    /// The same in those with the surface, J.
+    pub dissipated_surface: f64,
+    /// Energy ≥ 0 that the treatment of resting contacts itself added since the last kick, J.
+    pub added: f64,
+    /// Resting contacts at `time`.
+    pub contacts: u32,
+}
+
 /// How a grain came in or went out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Passage {
@@ -171,6 +211,10 @@ pub trait Observer {
     fn grain_collision(&mut self, _collision: &GrainCollision) {}
     /// A grain hit the surface.
     fn surface_hit(&mut self, _hit: &SurfaceHit) {}
+    /// Forces acted on the grains: the end of a sub-step.
+    fn kick(&mut self, _kick: &Kick) {}
+    /// Grains rested on each other or on the surface during a sub-step.
+    fn rest(&mut self, _rest: &Rest) {}
     /// A grain entered, left or was removed at `time` (s). The flight stands at that moment.
     fn passage(&mut self, _passage: Passage, _time: f64, _flight: &Flight, _grain: &Grain) {}
     /// A regular sample for time histories: the first at the start, the last at the end of the run.
@@ -192,6 +236,16 @@ impl<A: Observer, B: Observer> Observer for (A, B) {
     fn surface_hit(&mut self, hit: &SurfaceHit) {
         self.0.surface_hit(hit);
         self.1.surface_hit(hit);
+    }
+
+    fn kick(&mut self, kick: &Kick) {
+        self.0.kick(kick);
+        self.1.kick(kick);
+    }
+
+    fn rest(&mut self, rest: &Rest) {
+        self.0.rest(rest);
+        self.1.rest(rest);
     }
 
     fn passage(&mut self, passage: Passage, time: f64, flight: &Flight, grain: &Grain) {
