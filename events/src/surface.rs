@@ -47,6 +47,12 @@ pub trait Surface {
         self.first_contact(flight, until)
     }
 
+    /// Calls `visit` with every contact of `flight`, as it is at its local time, whose gap is less than `reach` (m): one for each direction in
+    /// which the surface carries the grain. Needed only where grains come to rest.
+    fn touches(&self, flight: &Flight, reach: f64, visit: &mut dyn FnMut(u32, SurfaceContact)) {
+        let _ = (flight, reach, visit);
+    }
+
     /// The contact between `element` and a flight that has been advanced to the moment of contact.
     fn contact(&self, element: u32, flight: &Flight) -> SurfaceContact;
 

@@ -8,6 +8,7 @@ use nalgebra::Vector3;
 
 use super::{Broken, GrainCollision, Observer, Passage, Progress, SurfaceHit};
 use crate::grains::{Grain, NewGrain, Snapshot};
+use crate::near_field::Singular;
 use crate::law::{Body, ContactLaw, Friction, resolve_pair, resolve_surface};
 use crate::scene::{Collapse, Interference};
 use crate::surface::LARGEST_SLOPE;
@@ -119,6 +120,10 @@ impl Row {
 pub struct Held {
     /// Impulse of the surface on grains, N s; counted in the velocities of chords.
     pub impulse_surface: Vector3<f64>,
+    /// What gravity and near field gave to grains that came or went, beyond or short of the kick before, N s.
+    pub impulse_gravity: Vector3<f64>,
+    /// The same of the near field.
+    pub impulse_near_field: Vector3<f64>,
     /// Kinetic energy taken from grains at contacts with each other, J; negative where some was given.
     pub dissipated_grain: f64,
     /// The same at contacts with the surface.
@@ -233,13 +238,13 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         &mut self,
         reach: f64,
         entering: Vector3<f64>,
-        kick: impl FnOnce(&S, &[Touch], &[Grain], &mut [Flight], &mut [Vector3<f64>]) -> f64,
+        kick: impl FnOnce(&S, &[Touch], &mut [Grain], &mut [Flight], &mut [Vector3<f64>]) -> f64,
     ) {
         self.entry_acceleration = entering;
         let after = self.time - self.epoch_start;
         self.natural_epoch(after);
         self.forces = true;
-        let (grains, mut length) = (&self.grains, 0.0);
+        let (grains, mut length) = (&mut self.grains, 0.0);
         self.encounters.start_sub_step(after, reach, |surface, touches, flights, accelerations| {
             length = kick(surface, touches, grains, flights, accelerations);
             length
@@ -269,6 +274,44 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             row.latest -= after;
         }
         (self.mark, self.since_mark) = (0.0, 0);
+    }
+
+    /// What contacts at rest did since it was last taken.
+    #[must_use]
+    pub fn held(&self) -> Held {
+        self.held
+    }
+
+    /// Largest radius of the grains inside, m.
+    #[must_use]
+    pub fn largest_radius(&self) -> f64 {
+        self.encounters.inside().map(|grain| self.encounters.flight(grain).radius).fold(0.0, f64::max)
+    }
+
+    /// Mass of all grains (kg), their momentum beyond that of their chords at simulated time `time` (N s), and how far that is behind the middle
+    /// of the sub-step (s).
+    #[must_use]
+    pub fn lag(&self, time: f64) -> (f64, Vector3<f64>, f64) {
+        let now = time - self.epoch_start;
+        let of_grain = |grain: u32| {
+            let mass = self.grains[grain as usize].mass;
+            (mass, self.encounters.bend(grain).velocity(now) * mass)
+        };
+        let add = |sum: (f64, Vector3<f64>), one: (f64, Vector3<f64>)| (sum.0 + one.0, sum.1 + one.1);
+        let (mass, lag) = self.encounters.inside().map(of_grain).fold((0.0, Vector3::zeros()), add);
+        (mass, lag, if self.forces { now - 0.5 * self.epoch } else { 0.0 })
+    }
+
+    /// The near field has no finite value; its grains are counted over those inside.
+    #[must_use]
+    pub fn singular(&self, singular: &Singular) -> Broken {
+        let inside: Vec<u32> = self.encounters.inside().collect();
+        let id = |number: usize| self.grains[inside[number] as usize].id;
+        let grains = match *singular {
+            Singular::Coincident(a, b) => vec![id(a), id(b)],
+            Singular::NotFinite(grain) => vec![id(grain)],
+        };
+        Broken::Singular { time: self.time, grains }
     }
 
     /// What contacts at rest did since this was last asked.
@@ -561,6 +604,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
 
     fn take_out(&mut self, passage: Passage, time: f64, grain: u32, observer: &mut impl Observer) {
         let flight = self.true_flight(grain);
+        self.pass(grain, 1.0);
         observer.passage(passage, self.epoch_start + time, &flight, &self.grains[grain as usize]);
         self.encounters.remove(grain);
     }
@@ -582,7 +626,11 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
                 *row = NO_ROW;
             }
         }
+        self.pass(slot as u32, -1.0);
         observer.passage(Passage::Entered, time, &flight, &grain);
+        if self.forces {
+            return;
+        }
         if flight.velocity.amax() > OUTRUN * self.fastest || OUTRUN * flight.radius < self.smallest {
             self.start_epoch(flight.time);
         }

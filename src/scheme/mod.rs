@@ -1,9 +1,12 @@
 //! Ways to advance time, and what each of them reports to its observers.
 
 mod event_driven;
+mod resting;
+mod substep;
 mod timetable;
 
-pub use event_driven::{EventDriven, LARGEST_OVERLAP, Laws};
+pub use event_driven::{EventDriven, Held, LARGEST_OVERLAP, LARGEST_OVERLAP_WITH_FORCES, Laws};
+pub use substep::{Forces, Substepped};
 pub use timetable::Moments;
 
 use impinge_events::Flight;
@@ -55,6 +58,14 @@ pub enum Broken {
         time: f64,
         /// Id of the grain.
         grain: u64,
+    },
+    /// Grains between which the near field is no finite number.
+    #[error("at t = {time} s the near field on {} no finite number: centres coincide", are(grains))]
+    Singular {
+        /// Simulated time, s.
+        time: f64,
+        /// Ids of the grains.
+        grains: Vec<u64>,
     },
     /// A velocity is no finite number.
     #[error("at t = {time} s the velocity of grain {} is no finite number", list(grains))]
@@ -225,6 +236,37 @@ pub trait Observer {
 
 /// Nobody watches.
 impl Observer for () {}
+
+/// Somebody else's observer watches.
+impl<O: Observer> Observer for &mut O {
+    fn grain_collision(&mut self, collision: &GrainCollision) {
+        (**self).grain_collision(collision);
+    }
+
+    fn surface_hit(&mut self, hit: &SurfaceHit) {
+        (**self).surface_hit(hit);
+    }
+
+    fn kick(&mut self, kick: &Kick) {
+        (**self).kick(kick);
+    }
+
+    fn rest(&mut self, rest: &Rest) {
+        (**self).rest(rest);
+    }
+
+    fn passage(&mut self, passage: Passage, time: f64, flight: &Flight, grain: &Grain) {
+        (**self).passage(passage, time, flight, grain);
+    }
+
+    fn sample(&mut self, snapshot: &Snapshot<'_>) {
+        (**self).sample(snapshot);
+    }
+
+    fn frame(&mut self, number: u32, snapshot: &Snapshot<'_>) {
+        (**self).frame(number, snapshot);
+    }
+}
 
 /// Two observers watch.
 impl<A: Observer, B: Observer> Observer for (A, B) {

@@ -114,6 +114,35 @@ impl Index {
         }
     }
 
+    /// Calls `visit` with every triangle nearer to `point` than `distance` (m), and its nearest point.
+    pub(super) fn within(&self, point: &Vector3<f64>, distance: f64, visit: &mut impl FnMut(u32, Vector3<f64>)) {
+        self.within_below(0, point, distance, visit);
+    }
+
+    fn within_below(
+        &self,
+        node: usize,
+        point: &Vector3<f64>,
+        distance: f64,
+        visit: &mut impl FnMut(u32, Vector3<f64>),
+    ) {
+        match &self.nodes[node] {
+            BvhNode::Leaf { shape_index, .. } => {
+                let nearest = self.mesh.nearest(*shape_index, point);
+                if (nearest - point).norm_squared() < distance * distance {
+                    visit(*shape_index as u32, nearest);
+                }
+            }
+            BvhNode::Node { child_l_index, child_l_aabb, child_r_index, child_r_aabb, .. } => {
+                for (bounds, child) in [(child_l_aabb, *child_l_index), (child_r_aabb, *child_r_index)] {
+                    if bounds.min_distance_squared(Point3::from(*point)) < distance * distance {
+                        self.within_below(child, point, distance, visit);
+                    }
+                }
+            }
+        }
+    }
+
     /// Whether `point` lies inside a watertight mesh: a ray from it comes out through an odd number of triangles.
     pub(super) fn encloses(&self, point: &Vector3<f64>) -> bool {
         if !self.mesh.is_watertight() || !self.bounds.contains(&Point3::from(*point)) {

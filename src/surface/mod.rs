@@ -204,6 +204,12 @@ impl impinge_events::Surface for Surface {
         self.first(until, |part, end| part.first_contact_bent(flight, bend, end))
     }
 
+    fn touches(&self, flight: &Flight, reach: f64, visit: &mut dyn FnMut(u32, SurfaceContact)) {
+        for part in &self.parts {
+            part.touches(flight, reach, visit);
+        }
+    }
+
     fn contact(&self, element: u32, flight: &Flight) -> SurfaceContact {
         let part = self.part(element);
         let (normal, gap) = match &part.shape {
@@ -267,6 +273,31 @@ impl Part {
         if approach > APPROACH_ROUNDING * self.speeds(flight) { sphere_plane(&seen, *point, *normal) } else { None }
     }
 
+    fn touches(&self, flight: &Flight, reach: f64, visit: &mut dyn FnMut(u32, SurfaceContact)) {
+        let centre = self.seen(flight).position;
+        let velocity = self.velocity;
+        match &self.shape {
+            Shape::Plane { point, normal } => {
+                let gap = (centre - point).dot(normal) - flight.radius;
+                if gap < reach {
+                    visit(self.first_element, SurfaceContact { normal: *normal, gap, velocity });
+                }
+            }
+            Shape::Mesh(mesh) => {
+                // Triangles that share the nearest point carry the grain once.
+                let mut seen: SmallNormals = SmallNormals::default();
+                mesh.0.within(&centre, flight.radius + reach, &mut |element, nearest| {
+                    let arm = centre - nearest;
+                    let distance = arm.norm();
+                    if distance > 0.0 && seen.is_new(arm / distance) {
+                        let contact = SurfaceContact { normal: arm / distance, gap: distance - flight.radius, velocity };
+                        visit(self.first_element + element, contact);
+                    }
+                });
+            }
+        }
+    }
+
     /// The flight as seen from this surface, in the coordinates in which it was made.
     #[inline]
     fn seen(&self, flight: &Flight) -> Flight {
@@ -318,6 +349,23 @@ impl Part {
                 (distance < radius).then_some((self.first_element + element, radius - distance))
             }
         }
+    }
+}
+
+/// Contact normals of one grain that differ.
+#[derive(Default)]
+struct SmallNormals(Vec<Vector3<f64>>);
+
+impl SmallNormals {
+    /// Cosine of the angle (4e-4) below which two normals are one.
+    const SAME: f64 = 1.0 - 1e-7;
+
+    fn is_new(&mut self, normal: Vector3<f64>) -> bool {
+        let new = self.0.iter().all(|known| known.dot(&normal) < Self::SAME);
+        if new {
+            self.0.push(normal);
+        }
+        new
     }
 }
 

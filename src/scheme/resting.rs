@@ -1,0 +1,310 @@
+//! Contacts at rest: what carries grains that forces press against each other and against the surface.
+//!
+//! Between two grains that rest against each other no collision happens. At each kick the contact forces are found that keep such contacts closed
+//! and do not pull (a linear complementarity problem, with Coulomb friction), by Gauss–Seidel sweeps that start from the forces of the kick
+//! before: in a pile at rest they hardly change, and a sweep or two are enough. This is the method of sequential impulses (Moreau 1999;
+//! Catto 2005), applied to accelerations.
+
+use impinge_events::{Flight, Surface, Touch};
+use nalgebra::Vector3;
+use rustc_hash::FxHashMap;
+
+use crate::grains::Grain;
+use crate::law::{ContactLaw, Friction};
+
+/// Two grains may rest against each other when their gap is below this part of the smaller radius, and a surface and a grain when it is below
+/// [`SURFACE_REACH`]. A wider gap of a contact at rest stays open until somebody closes it.
+pub(super) const PAIR_REACH: f64 = 1e-6;
+/// A grain that rests on the surface does so to rounding: a bounce, low as it be, is resolved.
+const SURFACE_REACH: f64 = 1e-9;
+/// Two grains are at rest against each other when they approach or part slower than this part of what the force gives in a sub-step.
+const PAIR_REST: f64 = 1.0;
+/// The same for a grain and the surface.
+const SURFACE_REST: f64 = 1e-3;
+/// Sweeps stop when no contact force changes by more than this part of the largest force.
+const ACCURACY: f64 = 1e-7;
+/// Sweeps at the most; what is left then is closed by events.
+const SWEEPS: u32 = 400;
+/// The surface in place of a first grain.
+const SURFACE: u32 = u32::MAX;
+
+/// One contact at rest. The normal points from the first to the second, which is always a grain.
+#[derive(Clone, Debug)]
+struct Contact {
+    first: u32,
+    second: u32,
+    /// Which element of the surface; 0 between grains.
+    element: u32,
+    normal: Vector3<f64>,
+    /// Velocity of the surface there, m/s.
+    velocity: Vector3<f64>,
+    /// Effective mass, kg.
+    mass: f64,
+    /// Coefficients of friction.
+    stick: f64,
+    slip: f64,
+    /// Force on the second grain along the normal, N; never negative.
+    support: f64,
+    /// Force on it across the normal, N.
+    shear: Vector3<f64>,
+}
+
+/// What is pushed: inverse masses, radii, and the two fields (accelerations or velocities) of all grains.
+struct Field<'a> {
+    grains: &'a [Grain],
+    flights: &'a [Flight],
+    linear: &'a mut [Vector3<f64>],
+    angular: &'a mut [Vector3<f64>],
+}
+
+/// The contacts at rest of a run.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Resting {
+    contacts: Vec<Contact>,
+    /// Forces of the kick before, by first, second and element.
+    before: FxHashMap<(u32, u32, u32), (f64, Vector3<f64>)>,
+    angular: Vec<Vector3<f64>>,
+    spins: Vec<Vector3<f64>>,
+}
+
+/// What contacts at rest did at one kick.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Carried {
+    pub(super) impulse_surface: Vector3<f64>,
+    pub(super) dissipated_grain: f64,
+    pub(super) dissipated_surface: f64,
+    pub(super) contacts: u32,
+}
+
+fn friction(law: &ContactLaw) -> (f64, f64) {
+    match law.friction {
+        Friction::Smooth => (0.0, 0.0),
+        Friction::Coulomb { static_, dynamic } => (static_, dynamic),
+        Friction::Regularised { coefficient, .. } => (coefficient, coefficient),
+    }
+}
+
+impl Field<'_> {
+    /// Rate at which the contact points move apart.
+    fn rate(&self, contact: &Contact) -> Vector3<f64> {
+        let at = |grain: u32, sign: f64| {
+            let arm = contact.normal * (sign * self.flights[grain as usize].radius);
+            self.linear[grain as usize] + self.angular[grain as usize].cross(&arm)
+        };
+        let second = at(contact.second, -1.0);
+        if contact.first == SURFACE { second } else { second - at(contact.first, 1.0) }
+    }
+
+    /// Pushes the second grain by `push` (N, N s), and the first back.
+    fn push(&mut self, contact: &Contact, push: Vector3<f64>) {
+        self.push_grain(contact.second, push, -contact.normal);
+        if contact.first != SURFACE {
+            self.push_grain(contact.first, -push, contact.normal);
+        }
+    }
+
+    fn push_grain(&mut self, grain: u32, push: Vector3<f64>, arm: Vector3<f64>) {
+        let grain = grain as usize;
+        let (mass, radius) = (self.grains[grain].mass, self.flights[grain].radius);
+        self.linear[grain] += push / mass;
+        self.angular[grain] += arm.cross(&push) / (0.4 * mass * radius);
+    }
+}
+
+impl Resting {
+    /// How near (m) grains of this radius (m) must be to rest against each other, where chords of sub-steps of length `step` (s) depart from paths
+    /// under accelerations of `acceleration` (m/s²).
+    pub(super) fn reach(radius: f64, acceleration: f64, step: f64) -> f64 {
+        PAIR_REACH * radius + 0.25 * acceleration * step * step
+    }
+
+    /// Finds the contacts at rest. `flights` are at their places, with the velocities of their chords of the sub-step before, and `pull` (m/s²) is
+    /// what acts on each grain now.
+    pub(super) fn find<S: Surface>(
+        &mut self,
+        surface: &S,
+        touches: &[Touch],
+        grains: &[Grain],
+        flights: &[Flight],
+        pull: &[Vector3<f64>],
+        step: f64,
+        [grain_law, surface_law]: [&ContactLaw; 2],
+    ) {
+        self.before.clear();
+        for contact in self.contacts.drain(..) {
+            self.before.insert((contact.first, contact.second, contact.element), (contact.support, contact.shear));
+        }
+        let strength = |grain: u32| pull[grain as usize].norm();
+        for &Touch { a, b, apart } in touches {
+            let (ours, theirs) = (&flights[a as usize], &flights[b as usize]);
+            let normal = apart.normalize();
+            let acceleration = strength(a).max(strength(b));
+            let gap = apart.norm() - ours.radius - theirs.radius;
+            let near = gap < Self::reach(ours.radius.min(theirs.radius), acceleration, step);
+            let rate = (theirs.velocity - ours.velocity).dot(&normal);
+            if near && rate.abs() <= PAIR_REST * acceleration * step {
+                let [ours, theirs] = [a, b].map(|grain| grains[grain as usize].mass);
+                let mass = ours * theirs / (ours + theirs);
+                self.take(a, b, 0, normal, Vector3::zeros(), mass, grain_law);
+            }
+        }
+        for (grain, flight) in (0..).zip(flights).filter(|(_, flight)| flight.radius > 0.0) {
+            let least = SURFACE_REST * strength(grain) * step;
+            surface.touches(flight, SURFACE_REACH * flight.radius, &mut |element, contact| {
+                if (flight.velocity - contact.velocity).dot(&contact.normal).abs() <= least {
+                    let mass = grains[grain as usize].mass;
+                    self.take(SURFACE, grain, element, contact.normal, contact.velocity, mass, surface_law);
+                }
+            });
+        }
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "all of them make a contact")]
+    fn take(
+        &mut self,
+        first: u32,
+        second: u32,
+        element: u32,
+        normal: Vector3<f64>,
+        velocity: Vector3<f64>,
+        mass: f64,
+        law: &ContactLaw,
+    ) {
+        let (stick, slip) = friction(law);
+        let (support, shear) = self.before.get(&(first, second, element)).copied().unwrap_or_default();
+        // The normal has turned a little since.
+        let shear = shear - normal * shear.dot(&normal);
+        self.contacts.push(Contact { first, second, element, normal, velocity, mass, stick, slip, support, shear });
+    }
+
+    /// How many contacts are at rest.
+    pub(super) fn count(&self) -> u32 {
+        self.contacts.len() as u32
+    }
+
+    /// Whether no contact is at rest.
+    pub(super) fn is_empty(&self) -> bool {
+        self.contacts.is_empty()
+    }
+
+    /// Adds what contacts carry to the accelerations `pull` (m/s²), so that no contact at rest is pressed together, and slip ends within `step`
+    /// (s) where friction can end it. Gives angular accelerations to [`angular`](Self::angular).
+    pub(super) fn carry(
+        &mut self,
+        grains: &[Grain],
+        flights: &[Flight],
+        pull: &mut [Vector3<f64>],
+        step: f64,
+    ) {
+        self.angular.clear();
+        self.angular.resize(flights.len(), Vector3::zeros());
+        let largest = pull.iter().map(|pull| pull.norm()).fold(0.0, f64::max);
+        let velocities: Vec<_> = flights.iter().map(|flight| flight.velocity).collect();
+        let slips: Vec<_> = self.slips(grains, flights, velocities);
+        let mut field = Field { grains, flights, linear: pull, angular: &mut self.angular };
+        for contact in &self.contacts {
+            field.push(contact, contact.normal * contact.support + contact.shear);
+        }
+        sweep(&mut self.contacts, &mut field, ACCURACY * largest, |number| slips[number] / step);
+    }
+
+    /// Slip of all contacts at the velocities given, m/s.
+    fn slips(&mut self, grains: &[Grain], flights: &[Flight], mut velocities: Vec<Vector3<f64>>) -> Vec<Vector3<f64>> {
+        self.spins.clear();
+        self.spins.extend(grains.iter().map(|grain| grain.spin));
+        let field = Field { grains, flights, linear: &mut velocities, angular: &mut self.spins };
+        let slip = |contact: &Contact| {
+            let rate = field.rate(contact) - contact.velocity;
+            rate - contact.normal * rate.dot(&contact.normal)
+        };
+        self.contacts.iter().map(slip).collect()
+    }
+
+    /// Ends what contacts at rest still approach: velocities, as of now, in place. Gives what was done.
+    pub(super) fn settle(&mut self, grains: &mut [Grain], flights: &mut [Flight], least: f64) -> Carried {
+        let approaching = self.contacts.iter().any(|contact| {
+            let first = if contact.first == SURFACE { contact.velocity } else { flights[contact.first as usize].velocity };
+            (flights[contact.second as usize].velocity - first).dot(&contact.normal) < -least
+        });
+        let mut carried = Carried { contacts: self.contacts.len() as u32, ..Carried::default() };
+        if !approaching {
+            return carried;
+        }
+        let mut velocities: Vec<_> = flights.iter().map(|flight| flight.velocity).collect();
+        let mut spins: Vec<_> = grains.iter().map(|grain| grain.spin).collect();
+        let mut contacts = self.contacts.clone();
+        for contact in &mut contacts {
+            (contact.support, contact.shear) = (0.0, Vector3::zeros());
+        }
+        let before = energy(grains, flights);
+        let mut field = Field { grains, flights, linear: &mut velocities, angular: &mut spins };
+        sweep(&mut contacts, &mut field, least, |_| Vector3::zeros());
+        for ((flight, grain), (velocity, spin)) in flights.iter_mut().zip(grains.iter_mut()).zip(velocities.iter().zip(&spins)) {
+            (flight.velocity, grain.spin) = (*velocity, *spin);
+        }
+        for contact in contacts.iter().filter(|contact| contact.first == SURFACE) {
+            carried.impulse_surface += contact.normal * contact.support + contact.shear;
+        }
+        carried.dissipated_grain = before - energy(grains, flights);
+        carried
+    }
+
+    /// Angular acceleration of a grain, rad/s².
+    pub(super) fn angular(&self, grain: usize) -> Vector3<f64> {
+        self.angular.get(grain).copied().unwrap_or_else(Vector3::zeros)
+    }
+
+    /// Force of the surface on all grains at rest, N, and the power (W) that contacts take from grains that move with the velocities of `flights`:
+    /// between grains, and at the surface.
+    pub(super) fn force_and_power(&mut self, grains: &[Grain], flights: &[Flight]) -> (Vector3<f64>, [f64; 2]) {
+        let mut velocities: Vec<_> = flights.iter().map(|flight| flight.velocity).collect();
+        self.spins.clear();
+        self.spins.extend(grains.iter().map(|grain| grain.spin));
+        let field = Field { grains, flights, linear: &mut velocities, angular: &mut self.spins };
+        let (mut force, mut power) = (Vector3::zeros(), [0.0; 2]);
+        for contact in &self.contacts {
+            let push = contact.normal * contact.support + contact.shear;
+            let at_surface = contact.first == SURFACE;
+            power[usize::from(at_surface)] -= push.dot(&field.rate(contact));
+            if at_surface {
+                force += push;
+            }
+        }
+        (force, power)
+    }
+}
+
+/// Kinetic energy of all grains, J.
+fn energy(grains: &[Grain], flights: &[Flight]) -> f64 {
+    grains.iter().zip(flights).filter(|(_, flight)| flight.radius > 0.0).map(|(grain, flight)| crate::grains::kinetic_energy(flight, grain)).sum()
+}
+
+/// Gauss–Seidel sweeps over the contacts until nothing changes by more than `least`. `slip` is what friction should take off each contact.
+fn sweep(contacts: &mut [Contact], field: &mut Field<'_>, least: f64, slip: impl Fn(usize) -> Vector3<f64>) {
+    for _ in 0..SWEEPS {
+        let mut change = 0f64;
+        for (number, contact) in contacts.iter_mut().enumerate() {
+            let rate = field.rate(contact);
+            let along = rate.dot(&contact.normal);
+            let support = (contact.support - contact.mass * along).max(0.0);
+            let mut push = contact.normal * (support - contact.support);
+            contact.support = support;
+            if contact.stick > 0.0 {
+                let across = rate - contact.normal * along + slip(number);
+                // 2/7 of the effective mass moves with the contact point of a sphere.
+                let mut shear = contact.shear - across * (2.0 / 7.0 * contact.mass);
+                let size = shear.norm();
+                if size > contact.stick * support {
+                    shear *= contact.slip * support / size;
+                }
+                push += shear - contact.shear;
+                contact.shear = shear;
+            }
+            field.push(contact, push);
+            change = change.max(push.norm() / contact.mass);
+        }
+        if change <= least {
+            return;
+        }
+    }
+}

@@ -1,0 +1,293 @@
+//! Forces between events: sub-steps of second order.
+//!
+//! Half kick, event-driven drift, half kick, with the kicks synchronised at each collision: at time tau inside a sub-step of length h grains
+//! collide with v + a (tau - h/2), where v is the velocity of the drift and a the acceleration, and go on with what comes out less
+//! a (tau - h/2). Without that, a collision inside a step leaves an error of the first order (Houndonougbo, Laird & Leimkuhler 2000 give the
+//! splitting). The engine does it as a change of frame ([`Bend`](impinge_events::Bend)): under a uniform acceleration the contacts of grains with
+//! each other and with planes come out exactly, whatever the length of the sub-step.
+
+use std::ops::ControlFlow;
+
+use impinge_events::calendar::{Calendar, Tournament};
+use impinge_events::{Flight, Surface};
+use nalgebra::Vector3;
+
+use super::event_driven::Held;
+use super::resting::Resting;
+use super::{Broken, EventDriven, Kick, Laws, Observer, Passage, Progress, Rest};
+use crate::grains::{Grain, NewGrain};
+use crate::near_field::{ForceSum, Singular};
+
+/// What acts on grains between events.
+#[derive(Clone, Debug)]
+pub struct Forces {
+    /// Uniform acceleration, m/s².
+    pub gravity: Vector3<f64>,
+    /// Near field between grains.
+    pub near_field: Option<ForceSum>,
+}
+
+/// Grains under forces, advanced in sub-steps from event to event.
+#[derive(Clone, Debug)]
+pub struct Substepped<S: Surface, C: Calendar = Tournament> {
+    engine: EventDriven<S, C>,
+    forces: Forces,
+    laws: Laws,
+    resting: Resting,
+    /// Length of a sub-step, s.
+    step: f64,
+    /// End of the current sub-step, simulated time, s.
+    step_end: f64,
+    /// What acted on each grain at the last kick, m/s², without what contacts carry.
+    pull: Vec<Vector3<f64>>,
+    /// Total of what forces and contacts at rest did until the last kick.
+    books: Books,
+    /// The same as last told to observers.
+    told: Books,
+    passages: Passages,
+    steps: u64,
+}
+
+/// What forces and contacts at rest did, in all.
+#[derive(Clone, Copy, Debug, Default)]
+struct Books {
+    /// When observers were told, simulated time, s.
+    time: Option<f64>,
+    impulse_gravity: Vector3<f64>,
+    impulse_near_field: Vector3<f64>,
+    impulse_surface: Vector3<f64>,
+    dissipated_grain: f64,
+    dissipated_surface: f64,
+    work_near_field: f64,
+    /// m g·x of grains that left, less that of grains that entered, J.
+    carried_away: f64,
+    /// m g·x of the grains inside, J.
+    depth: f64,
+}
+
+impl Books {
+    /// What has been added since `told`.
+    fn since(&self, told: &Self) -> (Kick, Rest) {
+        let kick = Kick {
+            work_gravity: self.depth + self.carried_away - told.depth - told.carried_away,
+            impulse_gravity: self.impulse_gravity - told.impulse_gravity,
+            impulse_near_field: self.impulse_near_field - told.impulse_near_field,
+            work_near_field: self.work_near_field - told.work_near_field,
+            ..Kick::default()
+        };
+        let grains = self.dissipated_grain - told.dissipated_grain;
+        let surface = self.dissipated_surface - told.dissipated_surface;
+        let rest = Rest {
+            impulse_surface: self.impulse_surface - told.impulse_surface,
+            dissipated_grain: grains.max(0.0),
+            dissipated_surface: surface.max(0.0),
+            added: (-grains).max(0.0) + (-surface).max(0.0),
+            ..Rest::default()
+        };
+        (kick, rest)
+    }
+
+    fn held(&mut self, held: &Held) {
+        self.impulse_surface += held.impulse_surface;
+        self.dissipated_grain += held.dissipated_grain;
+        self.dissipated_surface += held.dissipated_surface;
+        self.impulse_gravity += held.impulse_gravity;
+        self.impulse_near_field += held.impulse_near_field;
+    }
+}
+
+impl Forces {
+    /// Writes what acts on each grain (m/s²) to `pull`.
+    fn pull(&mut self, grains: &[Grain], flights: &[Flight], pull: &mut Vec<Vector3<f64>>) -> Result<(), Singular> {
+        pull.clear();
+        pull.resize(flights.len(), self.gravity);
+        let Some(near_field) = &mut self.near_field else { return Ok(()) };
+        let inside: Vec<usize> = (0..flights.len()).filter(|&slot| flights[slot].radius > 0.0).collect();
+        let positions: Vec<_> = inside.iter().map(|&slot| flights[slot].position).collect();
+        let mut forces = vec![Vector3::zeros(); positions.len()];
+        near_field.forces(&positions, None, &mut forces)?;
+        for (&slot, force) in inside.iter().zip(&forces) {
+            pull[slot] += force / grains[slot].mass;
+        }
+        Ok(())
+    }
+}
+
+impl<S: Surface, C: Calendar> Substepped<S, C> {
+    /// Grains under `forces` in sub-steps of `step` (s).
+    #[must_use]
+    pub fn new(engine: EventDriven<S, C>, forces: Forces, laws: Laws, step: f64) -> Self {
+        let step_end = engine.time();
+        Self {
+            engine,
+            forces,
+            laws,
+            resting: Resting::default(),
+            step: rounded(step),
+            step_end,
+            pull: Vec::new(),
+            books: Books::default(),
+            told: Books::default(),
+            passages: Passages::default(),
+            steps: 0,
+        }
+    }
+
+    /// Resolves all events up to simulated time `end` (s). When and how often it is called changes nothing of what happens.
+    ///
+    /// # Errors
+    /// A broken invariant, or grains between which there is no finite force.
+    pub fn advance(
+        &mut self,
+        end: f64,
+        observer: &mut impl Observer,
+        watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<ControlFlow<()>, Broken> {
+        loop {
+            if self.engine.time() >= self.step_end {
+                self.kick()?;
+            }
+            let until = end.min(self.step_end);
+            if self.engine.advance(until, &mut (&mut self.passages, observer), watch)?.is_break() {
+                return Ok(ControlFlow::Break(()));
+            }
+            if until >= end {
+                return Ok(ControlFlow::Continue(()));
+            }
+        }
+    }
+
+    /// Ends a sub-step and starts the next.
+    fn kick(&mut self) -> Result<(), Broken> {
+        let ended = if self.steps == 0 { 0.0 } else { self.step };
+        self.books.held(&self.engine.take_held());
+        let Self { engine, forces, laws, resting, pull, books, step, .. } = self;
+        let step = *step;
+        let strongest = pull.iter().map(|pull| pull.norm()).fold(forces.gravity.norm(), f64::max);
+        let reach = Resting::reach(engine.largest_radius(), 2.0 * strongest, step);
+        let (gravity, mut outcome) = (forces.gravity, Ok(()));
+        engine.start_sub_step(reach, gravity, |surface, touches, grains, flights, accelerations| {
+            outcome = forces.pull(grains, flights, pull);
+            accelerations.copy_from_slice(pull);
+            resting.find(surface, touches, grains, flights, pull, step, [&laws.grain, &laws.surface]);
+            let both = 0.5 * (ended + step);
+            if !resting.is_empty() {
+                resting.carry(grains, flights, accelerations, step);
+                let (force, [in_grains, at_surface]) = resting.force_and_power(grains, flights);
+                books.impulse_surface += force * both;
+                books.dissipated_grain += in_grains * both;
+                books.dissipated_surface += at_surface * both;
+            }
+            for (slot, (flight, acceleration)) in flights.iter_mut().zip(&*accelerations).enumerate() {
+                books.work_near_field += (pull[slot] - gravity).dot(&flight.velocity) * (grains[slot].mass * 0.5 * ended);
+                flight.velocity += acceleration * (0.5 * ended);
+                grains[slot].spin += resting.angular(slot) * both;
+            }
+            let least = 1e-6 * strongest * step;
+            let carried = resting.settle(grains, flights, least);
+            books.impulse_surface += carried.impulse_surface;
+            books.dissipated_grain += carried.dissipated_grain;
+            for (slot, (flight, acceleration)) in flights.iter_mut().zip(&*accelerations).enumerate() {
+                if flight.radius == 0.0 {
+                    continue;
+                }
+                flight.velocity += acceleration * (0.5 * step);
+                let mass = grains[slot].mass;
+                let near_field = pull[slot] - gravity;
+                books.impulse_gravity += gravity * (mass * both);
+                books.impulse_near_field += near_field * (mass * both);
+                books.work_near_field += near_field.dot(&flight.velocity) * (mass * 0.5 * step);
+            }
+            step
+        });
+        outcome.map_err(|singular| self.engine.singular(&singular))?;
+        self.steps += 1;
+        self.step_end = self.engine.time() + step;
+        Ok(())
+    }
+
+    /// Tells `observer` at simulated time `time` (s), to which the run has been advanced, what forces and contacts at rest did since it was last
+    /// told.
+    ///
+    /// # Errors
+    /// Grains between which there is no finite force.
+    pub fn tell(&mut self, time: f64, observer: &mut impl Observer) -> Result<(), Broken> {
+        let mut books = self.books;
+        books.held(&self.engine.held());
+        let (mass, lag, in_step) = self.engine.lag(time);
+        let gravity = self.forces.gravity * (mass * in_step);
+        books.impulse_gravity += gravity;
+        if self.forces.near_field.is_some() {
+            books.impulse_near_field += lag - gravity;
+        } else {
+            books.impulse_surface += lag - gravity;
+        }
+        books.carried_away = self.passages.depth(self.forces.gravity);
+        let (depth, potential) = self.engine.snapshot(time, |snapshot| {
+            let depth = snapshot.flights.iter().zip(snapshot.grains).map(|(flight, grain)| grain.mass * flight.position.dot(&self.forces.gravity)).sum();
+            let potential = self.forces.near_field.as_mut().map(|near_field| {
+                let positions: Vec<_> = snapshot.flights.iter().map(|flight| flight.position).collect();
+                near_field.potential_energy(&positions, None)
+            });
+            (depth, potential.transpose())
+        });
+        books.depth = depth;
+        let potential = potential.map_err(|singular| self.engine.singular(&singular))?;
+        let (kick, rest) = books.since(&self.told);
+        let first = self.told.time.is_none();
+        let work_gravity = if first { 0.0 } else { kick.work_gravity };
+        observer.kick(&Kick { time, potential_energy: potential, work_gravity, ..kick });
+        observer.rest(&Rest { time, contacts: self.resting.count(), ..rest });
+        self.told = Books { time: Some(time), ..books };
+        Ok(())
+    }
+
+    /// Takes a grain in at simulated time `time` (s), to which the run has been advanced. The near field acts on it from the next sub-step on.
+    pub fn enter(&mut self, time: f64, new: &NewGrain, observer: &mut impl Observer) {
+        self.engine.enter(time, new, &mut (&mut self.passages, observer));
+    }
+
+    /// The engine below.
+    #[must_use]
+    pub fn engine(&self) -> &EventDriven<S, C> {
+        &self.engine
+    }
+
+    /// Sub-steps so far.
+    #[must_use]
+    pub fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    /// Contacts at rest now.
+    #[must_use]
+    pub fn resting(&self) -> u32 {
+        self.resting.count()
+    }
+}
+
+/// A length of sub-steps of few digits (2^-26 of itself), so that their sum is exact for a hundred million of them.
+fn rounded(step: f64) -> f64 {
+    let unit = 2f64.powi(step.log2().floor() as i32 - 26);
+    (step / unit).round() * unit
+}
+
+/// Where grains came in and went out, m x (kg m).
+#[derive(Clone, Copy, Debug, Default)]
+struct Passages {
+    left: Vector3<f64>,
+}
+
+impl Passages {
+    /// m g·x of the grains that left less that of those that entered, J.
+    fn depth(&self, gravity: Vector3<f64>) -> f64 {
+        self.left.dot(&gravity)
+    }
+}
+
+impl Observer for Passages {
+    fn passage(&mut self, passage: Passage, _time: f64, flight: &Flight, grain: &Grain) {
+        let sign = if passage == Passage::Entered { -1.0 } else { 1.0 };
+        self.left += flight.position * (sign * grain.mass);
+    }
+}
