@@ -14,7 +14,7 @@ mod shape;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub(crate) use check::{LARGEST, SMALLEST};
+pub(crate) use check::{LARGEST, SMALLEST, unresolved};
 pub use check::{check, check_radius};
 pub use contact::{Collapse, Contact, Contacts, Friction, Regularised, StaticDynamic};
 pub use error::{Invalid, SceneError};

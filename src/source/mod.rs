@@ -21,7 +21,7 @@ use nalgebra::Vector3;
 pub use nozzle::Nozzle;
 
 use crate::grains::NewGrain;
-use crate::scene::{Boundary, Domain, Invalid, Scene, Source};
+use crate::scene::{Boundary, Domain, Invalid, Scene, Source, unresolved};
 use cells::Cells;
 use context::Context;
 
@@ -166,6 +166,9 @@ fn check_alone(
         return refuse(&what, "move the grain or enlarge the domain");
     }
     check_period(domain, grain.radius)?;
+    if let Some((what, remedy)) = unresolved(grain.radius, domain) {
+        return Err(Invalid::new(origins.key(id), format!("{}: {what}", origins.name(id)), remedy));
+    }
     match surface_overlap(grain.position, grain.radius) {
         Some((surface, depth)) if !just_touches(depth, grain.radius) => {
             refuse(&format!("overlaps surface[{surface}] by {depth:.3e} m"), "move the grain away from the surface")
