@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::calendar::{Calendar, Event, Kind, Tournament};
-use crate::contact_time::{sphere_sphere, spheres_may_touch};
+use crate::contact_time::{sphere_sphere, sphere_sphere_yielding, spheres_may_touch};
 use crate::lists::{Lists, skin};
 use crate::neighbors::Cells;
 use crate::{Bend, Domain, Flight, NoSurface, Outlook, Surface};
@@ -34,6 +34,9 @@ pub enum Encounter {
 
 /// No partner.
 const NOBODY: u32 = u32::MAX;
+
+/// By this part of the smaller radius grains that touch under force may overlap before they meet again ([`sphere_sphere_yielding`]).
+pub const YIELDING: f64 = 1e-6;
 
 /// After so many crossings a grain the layout of the cells is thought over.
 const CROSSINGS_PER_GRAIN: usize = 8;
@@ -197,6 +200,11 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         let acceleration = self.accelerations.get(grain as usize).copied().unwrap_or_else(Vector3::zeros);
         let step = if self.horizon < f64::INFINITY { self.horizon } else { 0.0 };
         Bend { acceleration, step }
+    }
+
+    /// Adds to the acceleration (m/s²) of a grain that has just met something, as if it had been so since the sub-step began: the chord stays.
+    pub fn pull(&mut self, grain: u32, more: Vector3<f64>) {
+        self.accelerations[grain as usize] += more;
     }
 
     /// Changes the acceleration (m/s²) of a grain that has just met something and is yet to be deflected: place and velocity stay, the chord
@@ -604,7 +612,8 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     fn search(&self, grain: u32) -> Search<'_> {
         let (flight, plan) = (self.flights[grain as usize], &self.plans[grain as usize]);
         let until = plan.pair.time.min(plan.side.time).min(self.horizon);
-        Search { grain, flight, until, flights: &self.flights, plans: &self.plans, best: plan.pair, looks: 0 }
+        let under_force = !self.accelerations.is_empty();
+        Search { grain, flight, until, under_force, flights: &self.flights, plans: &self.plans, best: plan.pair, looks: 0 }
     }
 
     /// Puts a meeting into the plans of both grains, and leaves the one that `grain` or its new partner had in mind before.
@@ -670,6 +679,8 @@ struct Search<'a> {
     flight: Flight,
     /// Later meetings do not count, s.
     until: f64,
+    /// Whether grains press against each other.
+    under_force: bool,
     flights: &'a [Flight],
     plans: &'a [Plan],
     /// The best so far.
@@ -689,7 +700,13 @@ impl Search<'_> {
         if !spheres_may_touch(&self.flight, theirs, shift, self.until) {
             return;
         }
-        let Some(time) = sphere_sphere(&self.flight, theirs, shift) else { return };
+        let met = if self.under_force {
+            let slack = YIELDING * self.flight.radius.min(theirs.radius);
+            sphere_sphere_yielding(&self.flight, theirs, shift, slack)
+        } else {
+            sphere_sphere(&self.flight, theirs, shift)
+        };
+        let Some(time) = met else { return };
         if time > self.until {
             return;
         }

@@ -3,13 +3,14 @@
 use std::ops::ControlFlow;
 
 use impinge_events::calendar::{Calendar, Tournament};
-use impinge_events::{Domain, Encounter, Encounters, Flight, Surface, SurfaceContact, Touch};
+use impinge_events::{Domain, Encounter, Encounters, Flight, Surface, SurfaceContact, Touch, YIELDING};
 use nalgebra::Vector3;
+use rustc_hash::FxHashSet;
 
 use super::{Broken, GrainCollision, Observer, Passage, Progress, SurfaceHit};
 use crate::grains::{Grain, NewGrain, Snapshot};
 use crate::near_field::Singular;
-use crate::law::{Body, ContactLaw, Friction, resolve_pair, resolve_surface};
+use crate::law::{NearField, Body, ContactLaw, Friction, resolve_pair, resolve_surface};
 use crate::scene::{Collapse, Interference};
 use crate::surface::LARGEST_SLOPE;
 
@@ -92,10 +93,15 @@ const NOBODY: u32 = u32::MAX;
 const SURFACE: u32 = u32::MAX - 1;
 
 impl Row {
+    /// Whether another grain was hit in the row.
+    fn among_grains(&self) -> bool {
+        self.partners.iter().any(|&partner| partner < SURFACE)
+    }
+
     /// Notes a hit with `partner` at `approach` (m/s) at `time` (s), in a row if it is at most `within` (s) after the one before, and tells
     /// whether the grain is part of a collapse that does not end by itself.
     #[inline]
-    fn note(&mut self, time: f64, within: f64, partner: u32, approach: f64) -> bool {
+    fn note(&mut self, time: f64, within: f64, partner: u32, approach: f64, in_line: bool) -> bool {
         if time - self.latest > within {
             *self = NO_ROW;
         }
@@ -111,7 +117,7 @@ impl Row {
                 None => self.caged = true,
             }
         }
-        (self.caged && self.hits > COLLAPSE_HITS) || self.not_halved > COLLAPSE_HITS_IN_LINE
+        (self.caged && self.hits > COLLAPSE_HITS) || (in_line && self.not_halved > COLLAPSE_HITS_IN_LINE)
     }
 }
 
@@ -158,6 +164,16 @@ pub struct EventDriven<S: Surface, C: Calendar = Tournament> {
     forces: bool,
     /// Acceleration of a grain that enters, until the next sub-step, m/s².
     entry_acceleration: Vector3<f64>,
+    /// Approach speed below which a contact under force has come to rest, m/s.
+    resting_speed: f64,
+    /// The same for two grains, and for grains among others at the surface.
+    resting_speed_of_pairs: f64,
+    /// The near field, as it acts between two grains that touch.
+    near_field: Option<NearField>,
+    /// Where the grains were at the last kick, m; empty without a near field.
+    anchors: Vec<Vector3<f64>>,
+    /// Pairs whose accelerations are those of their contact already.
+    synchronised: FxHashSet<[u32; 2]>,
     /// What contacts at rest did since it was last asked.
     held: Held,
     /// Simulated time that has been reached, s.
@@ -195,6 +211,11 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             in_a_row: 0.0,
             forces: false,
             entry_acceleration: Vector3::zeros(),
+            resting_speed: 0.0,
+            resting_speed_of_pairs: 0.0,
+            near_field: None,
+            anchors: Vec::new(),
+            synchronised: FxHashSet::default(),
             held: Held::default(),
             time: start,
             entered,
@@ -233,22 +254,33 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     }
 
     /// Starts a sub-step at the time that has been reached; grains that enter in it are accelerated at `entering` (m/s²). `kick` is given what
-    /// [`Encounters::start_sub_step`] gives it, and what grains carry; it gives the length of the sub-step (s).
+    /// [`Encounters::start_sub_step`] gives it, and what grains carry; it gives the length of the sub-step (s) and the strongest acceleration.
     pub fn start_sub_step(
         &mut self,
         reach: f64,
         entering: Vector3<f64>,
-        kick: impl FnOnce(&S, &[Touch], &mut [Grain], &mut [Flight], &mut [Vector3<f64>]) -> f64,
+        near_field: Option<NearField>,
+        kick: impl FnOnce(&S, &[Touch], &mut [Grain], &mut [Flight], &mut [Vector3<f64>]) -> (f64, f64),
     ) {
         self.entry_acceleration = entering;
+        self.near_field = near_field;
         let after = self.time - self.epoch_start;
         self.natural_epoch(after);
         self.forces = true;
-        let (grains, mut length) = (&mut self.grains, 0.0);
+        let (grains, mut length, mut strongest) = (&mut self.grains, 0.0, 0.0);
         self.encounters.start_sub_step(after, reach, |surface, touches, flights, accelerations| {
-            length = kick(surface, touches, grains, flights, accelerations);
+            (length, strongest) = kick(surface, touches, grains, flights, accelerations);
             length
         });
+        self.resting_speed = STICKING * strongest * length;
+        let sticks = self.laws.grain.restitution < 1.0;
+        self.resting_speed_of_pairs = if sticks { strongest * length } else { self.resting_speed };
+        self.anchors.clear();
+        self.synchronised.clear();
+        if near_field.is_some() {
+            let slots = 0..self.grains.len() as u32;
+            self.anchors.extend(slots.map(|grain| self.encounters.flight(grain).position));
+        }
         self.begin(after, length);
     }
 
@@ -394,18 +426,22 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     #[inline]
     fn is_collapsing(&mut self, time: f64, grain: u32, partner: u32, approach: f64) -> bool {
         let within = self.in_a_row;
-        self.rows.get_mut(grain as usize).is_some_and(|row| row.note(time, within, partner, approach))
+        // Under force, a line comes to rest.
+        let in_line = !self.forces;
+        self.rows.get_mut(grain as usize).is_some_and(|row| row.note(time, within, partner, approach, in_line))
     }
 
     /// Two grains touch.
     fn collide(&mut self, time: f64, a: u32, b: u32, observer: &mut impl Observer) -> Result<(), Broken> {
         // The lower id is the first of the two: slots are used again, ids are not.
         let (a, b) = if self.grains[a as usize].id < self.grains[b as usize].id { (a, b) } else { (b, a) };
+        self.synchronise(a, b);
         let (first, second) = (self.body(a), self.body(b));
         let (flight_a, flight_b) = (self.true_flight(a), self.true_flight(b));
-        let apart = self.domain.nearest(flight_b.position - flight_a.position);
-        let distance = apart.norm();
-        let normal = apart / distance;
+        // The chords touch, and the normal is theirs: whoever resolves a contact sees the approach that the prediction saw.
+        let chords = self.encounters.flight(b).position - self.encounters.flight(a).position;
+        let normal = self.domain.nearest(chords).normalize();
+        let distance = self.domain.nearest(flight_b.position - flight_a.position).norm();
         let ids = [self.grains[a as usize].id, self.grains[b as usize].id];
         let overlap_over_radius = (first.radius + second.radius - distance) / first.radius.min(second.radius);
         let shielded = self.laws.interference == Interference::RemovedOnFirstCollision
@@ -417,7 +453,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             self.deflect(&[(other, onwards)]);
             return Ok(());
         }
-        if self.forces && self.pair_rests(a, b, &first, &second, normal) {
+        if self.forces && (first.velocity - second.velocity).dot(&normal) <= self.resting_speed_of_pairs {
             return self.hold_pair(time, [a, b], [first, second], normal, overlap_over_radius);
         }
         let mut contact = resolve_pair(&self.laws.grain, &first, &second, normal);
@@ -466,7 +502,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             }
             contact.normal = Vector3::new(contact.normal.x, 0.0, contact.normal.z).normalize();
         }
-        if self.forces && self.rests_on_surface(grain, &before, &contact) {
+        if self.forces && -(before.velocity - contact.velocity).dot(&contact.normal) <= self.resting_speed_at_surface(grain) {
             return self.hold_on_surface(time, grain, &before, &contact);
         }
         let mut resolved = resolve_surface(&self.laws.surface, &before, contact.normal, contact.velocity);
@@ -514,12 +550,21 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         Ok(())
     }
 
-    /// Whether two grains that touch are at rest against each other: their chords approach, and they themselves do not, or hardly.
-    fn pair_rests(&self, a: u32, b: u32, first: &Body, second: &Body, normal: Vector3<f64>) -> bool {
-        let approach = (first.velocity - second.velocity).dot(&normal);
-        let [bend_a, bend_b] = [a, b].map(|grain| self.encounters.bend(grain));
-        let pull = (bend_a.acceleration - bend_b.acceleration).dot(&normal).abs();
-        approach <= STICKING * pull * self.epoch
+    /// Gives two grains that touch the accelerations they have there: the near field between the two at contact, in place of that at the last
+    /// kick. The rest of the near field hardly changes within a sub-step.
+    #[inline]
+    fn synchronise(&mut self, a: u32, b: u32) {
+        let Some(near_field) = self.near_field else { return };
+        let slots = self.anchors.len() as u32;
+        if a < slots && b < slots && self.synchronised.insert([a, b]) {
+            let [at_kick_a, at_kick_b] = [a, b].map(|grain| self.anchors[grain as usize]);
+            let now = self.true_flight(b).position - self.true_flight(a).position;
+            let force = near_field.force_on(self.domain.nearest(now))
+                - near_field.force_on(self.domain.nearest(at_kick_b - at_kick_a));
+            for (grain, force) in [(a, force), (b, -force)] {
+                self.encounters.pull(grain, force / self.grains[grain as usize].mass);
+            }
+        }
     }
 
     /// Two grains at rest against each other stay so until the end of the sub-step: what their chords approach is taken away by an impulse.
@@ -534,7 +579,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let ids = grains.map(|grain| self.grains[grain as usize].id);
         let [first, second] = bodies;
         let chords = grains.map(|grain| self.encounters.flight(grain).velocity);
-        let approach = (chords[0] - chords[1]).dot(&normal).max(0.0);
+        // They part by a trifle, or their neighbours would press them together again without end.
+        let parting = YIELDING * first.radius.min(second.radius) / self.epoch;
+        let approach = ((chords[0] - chords[1]).dot(&normal) + parting).max(0.0);
         let impulse = normal * (approach * first.mass * second.mass / (first.mass + second.mass));
         let after = [first.velocity - impulse / first.mass, second.velocity + impulse / second.mass];
         self.check(time, &ids, overlap_over_radius, &after)?;
@@ -544,11 +591,10 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         Ok(())
     }
 
-    /// Whether a grain that touches the surface is at rest against it.
-    fn rests_on_surface(&self, grain: u32, before: &Body, contact: &SurfaceContact) -> bool {
-        let approach = -(before.velocity - contact.velocity).dot(&contact.normal);
-        let pull = self.encounters.bend(grain).acceleration.dot(&contact.normal).abs();
-        approach <= STICKING * pull * self.epoch
+    /// Approach speed (m/s) below which a grain has come to rest against the surface.
+    fn resting_speed_at_surface(&self, grain: u32) -> f64 {
+        let among_grains = self.rows.get(grain as usize).is_some_and(|row| row.among_grains());
+        if among_grains { self.resting_speed_of_pairs } else { self.resting_speed }
     }
 
     /// A grain at rest against the surface stays so until the end of the sub-step: the surface carries what pulls it there.
@@ -607,6 +653,17 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.pass(grain, 1.0);
         observer.passage(passage, self.epoch_start + time, &flight, &self.grains[grain as usize]);
         self.encounters.remove(grain);
+    }
+
+    /// Books what forces gave to a grain that goes (`sign` 1) or comes (-1) beyond the kick before.
+    fn pass(&mut self, grain: u32, sign: f64) {
+        if self.forces {
+            let bend = self.encounters.bend(grain);
+            let mass = sign * self.grains[grain as usize].mass;
+            let lag = self.encounters.flight(grain).time - 0.5 * bend.step;
+            self.held.impulse_gravity += self.entry_acceleration * (mass * lag);
+            self.held.impulse_near_field += (bend.acceleration - self.entry_acceleration) * (mass * lag);
+        }
     }
 
     /// Takes a grain in at simulated time `time` (s), to which the run has been advanced.

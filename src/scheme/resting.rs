@@ -5,7 +5,7 @@
 //! before: in a pile at rest they hardly change, and a sweep or two are enough. This is the method of sequential impulses (Moreau 1999;
 //! Catto 2005), applied to accelerations.
 
-use impinge_events::{Flight, Surface, Touch};
+use impinge_events::{Flight, Surface, SurfaceContact, Touch};
 use nalgebra::Vector3;
 use rustc_hash::FxHashMap;
 
@@ -23,6 +23,10 @@ const PAIR_REST: f64 = 1.0;
 const SURFACE_REST: f64 = 1e-3;
 /// Sweeps stop when no contact force changes by more than this part of the largest force.
 const ACCURACY: f64 = 1e-7;
+/// Part of the gap, or of the overlap, of a contact at rest that is closed in a sub-step, so that rounding and unfinished sweeps do not add up.
+const CLOSING: f64 = 0.1;
+/// Closing takes no more than this part of the largest acceleration.
+const CLOSING_PULL: f64 = 0.01;
 /// Sweeps at the most; what is left then is closed by events.
 const SWEEPS: u32 = 400;
 /// The surface in place of a first grain.
@@ -40,6 +44,12 @@ struct Contact {
     velocity: Vector3<f64>,
     /// Effective mass, kg.
     mass: f64,
+    /// Distance, negative where they overlap, m.
+    gap: f64,
+    /// Rate at which the gap should change, m/s², so that it closes.
+    closing: f64,
+    /// Slip that friction should end, over the length of a sub-step, m/s².
+    slipping: Vector3<f64>,
     /// Coefficients of friction.
     stick: f64,
     slip: f64,
@@ -145,36 +155,40 @@ impl Resting {
             if near && rate.abs() <= PAIR_REST * acceleration * step {
                 let [ours, theirs] = [a, b].map(|grain| grains[grain as usize].mass);
                 let mass = ours * theirs / (ours + theirs);
-                self.take(a, b, 0, normal, Vector3::zeros(), mass, grain_law);
+                self.take(a, b, 0, SurfaceContact { normal, gap, velocity: Vector3::zeros() }, mass, grain_law);
             }
         }
+        let mut among_grains = vec![false; flights.len()];
+        for contact in &self.contacts {
+            among_grains[contact.first as usize] = true;
+            among_grains[contact.second as usize] = true;
+        }
         for (grain, flight) in (0..).zip(flights).filter(|(_, flight)| flight.radius > 0.0) {
-            let least = SURFACE_REST * strength(grain) * step;
-            surface.touches(flight, SURFACE_REACH * flight.radius, &mut |element, contact| {
+            let pull = strength(grain) * step;
+            let (reach, least) = if among_grains[grain as usize] {
+                (PAIR_REACH * flight.radius, PAIR_REST * pull)
+            } else {
+                (SURFACE_REACH * flight.radius, SURFACE_REST * pull)
+            };
+            surface.touches(flight, reach, &mut |element, contact| {
                 if (flight.velocity - contact.velocity).dot(&contact.normal).abs() <= least {
                     let mass = grains[grain as usize].mass;
-                    self.take(SURFACE, grain, element, contact.normal, contact.velocity, mass, surface_law);
+                    self.take(SURFACE, grain, element, contact, mass, surface_law);
                 }
             });
         }
     }
 
-    #[expect(clippy::too_many_arguments, reason = "all of them make a contact")]
-    fn take(
-        &mut self,
-        first: u32,
-        second: u32,
-        element: u32,
-        normal: Vector3<f64>,
-        velocity: Vector3<f64>,
-        mass: f64,
-        law: &ContactLaw,
-    ) {
+    fn take(&mut self, first: u32, second: u32, element: u32, contact: SurfaceContact, mass: f64, law: &ContactLaw) {
+        let SurfaceContact { normal, gap, velocity } = contact;
         let (stick, slip) = friction(law);
         let (support, shear) = self.before.get(&(first, second, element)).copied().unwrap_or_default();
         // The normal has turned a little since.
         let shear = shear - normal * shear.dot(&normal);
-        self.contacts.push(Contact { first, second, element, normal, velocity, mass, stick, slip, support, shear });
+        let (closing, slipping) = (0.0, Vector3::zeros());
+        self.contacts.push(Contact {
+            first, second, element, normal, velocity, mass, gap, closing, slipping, stick, slip, support, shear,
+        });
     }
 
     /// How many contacts are at rest.
@@ -199,25 +213,32 @@ impl Resting {
         self.angular.clear();
         self.angular.resize(flights.len(), Vector3::zeros());
         let largest = pull.iter().map(|pull| pull.norm()).fold(0.0, f64::max);
-        let velocities: Vec<_> = flights.iter().map(|flight| flight.velocity).collect();
-        let slips: Vec<_> = self.slips(grains, flights, velocities);
+        self.aim(grains, flights, step, CLOSING_PULL * largest);
         let mut field = Field { grains, flights, linear: pull, angular: &mut self.angular };
         for contact in &self.contacts {
             field.push(contact, contact.normal * contact.support + contact.shear);
         }
-        sweep(&mut self.contacts, &mut field, ACCURACY * largest, |number| slips[number] / step);
+        sweep(&mut self.contacts, &mut field, ACCURACY * largest);
+        for contact in self.contacts.iter_mut().filter(|contact| contact.first == SURFACE && contact.support > 0.0) {
+            // What is left of the sweeps would be a tiny fall, and a hit.
+            let push = contact.mass * (contact.closing - field.rate(contact).dot(&contact.normal));
+            contact.support += push;
+            field.push(contact, contact.normal * push);
+        }
     }
 
-    /// Slip of all contacts at the velocities given, m/s.
-    fn slips(&mut self, grains: &[Grain], flights: &[Flight], mut velocities: Vec<Vector3<f64>>) -> Vec<Vector3<f64>> {
+    /// Says for all contacts at which rate the gap should close and how much slip should end, at the velocities of `flights`.
+    fn aim(&mut self, grains: &[Grain], flights: &[Flight], step: f64, most: f64) {
+        let mut velocities: Vec<_> = flights.iter().map(|flight| flight.velocity).collect();
         self.spins.clear();
         self.spins.extend(grains.iter().map(|grain| grain.spin));
         let field = Field { grains, flights, linear: &mut velocities, angular: &mut self.spins };
-        let slip = |contact: &Contact| {
+        for contact in &mut self.contacts {
             let rate = field.rate(contact) - contact.velocity;
-            rate - contact.normal * rate.dot(&contact.normal)
-        };
-        self.contacts.iter().map(slip).collect()
+            let along = rate.dot(&contact.normal);
+            contact.closing = ((-CLOSING * contact.gap / step - along) / step).clamp(-most, most);
+            contact.slipping = (rate - contact.normal * along) / step;
+        }
     }
 
     /// Ends what contacts at rest still approach: velocities, as of now, in place. Gives what was done.
@@ -235,10 +256,11 @@ impl Resting {
         let mut contacts = self.contacts.clone();
         for contact in &mut contacts {
             (contact.support, contact.shear) = (0.0, Vector3::zeros());
+            (contact.closing, contact.slipping) = (0.0, Vector3::zeros());
         }
         let before = energy(grains, flights);
         let mut field = Field { grains, flights, linear: &mut velocities, angular: &mut spins };
-        sweep(&mut contacts, &mut field, least, |_| Vector3::zeros());
+        sweep(&mut contacts, &mut field, least);
         for ((flight, grain), (velocity, spin)) in flights.iter_mut().zip(grains.iter_mut()).zip(velocities.iter().zip(&spins)) {
             (flight.velocity, grain.spin) = (*velocity, *spin);
         }
@@ -279,18 +301,18 @@ fn energy(grains: &[Grain], flights: &[Flight]) -> f64 {
     grains.iter().zip(flights).filter(|(_, flight)| flight.radius > 0.0).map(|(grain, flight)| crate::grains::kinetic_energy(flight, grain)).sum()
 }
 
-/// Gauss–Seidel sweeps over the contacts until nothing changes by more than `least`. `slip` is what friction should take off each contact.
-fn sweep(contacts: &mut [Contact], field: &mut Field<'_>, least: f64, slip: impl Fn(usize) -> Vector3<f64>) {
+/// Gauss–Seidel sweeps over the contacts until nothing changes by more than `least`.
+fn sweep(contacts: &mut [Contact], field: &mut Field<'_>, least: f64) {
     for _ in 0..SWEEPS {
         let mut change = 0f64;
-        for (number, contact) in contacts.iter_mut().enumerate() {
+        for contact in contacts.iter_mut() {
             let rate = field.rate(contact);
             let along = rate.dot(&contact.normal);
-            let support = (contact.support - contact.mass * along).max(0.0);
+            let support = (contact.support - contact.mass * (along - contact.closing)).max(0.0);
             let mut push = contact.normal * (support - contact.support);
             contact.support = support;
             if contact.stick > 0.0 {
-                let across = rate - contact.normal * along + slip(number);
+                let across = rate - contact.normal * along + contact.slipping;
                 // 2/7 of the effective mass moves with the contact point of a sphere.
                 let mut shear = contact.shear - across * (2.0 / 7.0 * contact.mass);
                 let size = shear.norm();

@@ -148,7 +148,7 @@ impl<S: Surface, C: Calendar> Substepped<S, C> {
                 self.kick()?;
             }
             let until = end.min(self.step_end);
-            if self.engine.advance(until, &mut (&mut self.passages, observer), watch)?.is_break() {
+            if self.engine.advance(until, &mut (&mut self.passages, &mut *observer), watch)?.is_break() {
                 return Ok(ControlFlow::Break(()));
             }
             if until >= end {
@@ -166,9 +166,11 @@ impl<S: Surface, C: Calendar> Substepped<S, C> {
         let strongest = pull.iter().map(|pull| pull.norm()).fold(forces.gravity.norm(), f64::max);
         let reach = Resting::reach(engine.largest_radius(), 2.0 * strongest, step);
         let (gravity, mut outcome) = (forces.gravity, Ok(()));
-        engine.start_sub_step(reach, gravity, |surface, touches, grains, flights, accelerations| {
+        let near_field = forces.near_field.as_ref().map(|sum| *sum.law());
+        engine.start_sub_step(reach, gravity, near_field, |surface, touches, grains, flights, accelerations| {
             outcome = forces.pull(grains, flights, pull);
             accelerations.copy_from_slice(pull);
+            let strongest = pull.iter().map(|pull| pull.norm()).fold(0.0, f64::max);
             resting.find(surface, touches, grains, flights, pull, step, [&laws.grain, &laws.surface]);
             let both = 0.5 * (ended + step);
             if !resting.is_empty() {
@@ -198,7 +200,7 @@ impl<S: Surface, C: Calendar> Substepped<S, C> {
                 books.impulse_near_field += near_field * (mass * both);
                 books.work_near_field += near_field.dot(&flight.velocity) * (mass * 0.5 * step);
             }
-            step
+            (step, strongest)
         });
         outcome.map_err(|singular| self.engine.singular(&singular))?;
         self.steps += 1;

@@ -53,6 +53,21 @@ pub fn sphere_sphere(a: &Flight, b: &Flight, shift: Vector3<f64>) -> Option<f64>
     None
 }
 
+/// As [`sphere_sphere`] for spheres under force, which may press against each other: a pair that touches already, nearer than ¼ `slack` (m), meets only when
+/// it overlaps by `slack`.
+///
+/// So what is left of an approach when a contact has come to rest makes no event as long as it leads nowhere.
+#[must_use]
+pub fn sphere_sphere_yielding(a: &Flight, b: &Flight, shift: Vector3<f64>, slack: f64) -> Option<f64> {
+    let base = a.time.max(b.time);
+    let touching = a.radius + b.radius + 0.25 * slack;
+    if (b.position_at(base) - a.position_at(base) + shift).norm_squared() > touching * touching {
+        return sphere_sphere(a, b, shift);
+    }
+    let shrunk = |flight: &Flight| Flight { radius: flight.radius - 0.5 * slack, ..*flight };
+    sphere_sphere(&shrunk(a), &shrunk(b), shift)
+}
+
 /// Whether the spheres `a` and `b` may touch until `until` (s, epoch time): a bound without branch or root that hardly ever says yes in
 /// vain, so that most pairs need no more.
 ///
