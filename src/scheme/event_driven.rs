@@ -240,6 +240,12 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.epoch_start
     }
 
+    /// The region that is simulated.
+    #[must_use]
+    pub fn domain(&self) -> Domain {
+        self.domain
+    }
+
     /// What the grains can hit.
     #[must_use]
     pub fn surface(&self) -> &S {

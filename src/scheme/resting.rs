@@ -22,13 +22,13 @@ const PAIR_REST: f64 = 1.0;
 /// The same for a grain and the surface.
 const SURFACE_REST: f64 = 1e-3;
 /// Sweeps stop when no contact force changes by more than this part of the largest force.
-const ACCURACY: f64 = 1e-7;
+const ACCURACY: f64 = 1e-4;
 /// Part of the gap, or of the overlap, of a contact at rest that is closed in a sub-step, so that rounding and unfinished sweeps do not add up.
 const CLOSING: f64 = 0.1;
 /// Closing takes no more than this part of the largest acceleration.
 const CLOSING_PULL: f64 = 0.01;
 /// Sweeps at the most; what is left then is closed by events.
-const SWEEPS: u32 = 400;
+const SWEEPS: u32 = 100;
 /// The surface in place of a first grain.
 const SURFACE: u32 = u32::MAX;
 
@@ -77,13 +77,13 @@ pub(super) struct Resting {
     spins: Vec<Vector3<f64>>,
 }
 
-/// What contacts at rest did at one kick.
+/// What the end of an approach at contacts at rest did.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Carried {
+pub(super) struct Settled {
+    /// Impulse of the surface on grains, N s.
     pub(super) impulse_surface: Vector3<f64>,
-    pub(super) dissipated_grain: f64,
-    pub(super) dissipated_surface: f64,
-    pub(super) contacts: u32,
+    /// Kinetic energy taken, J.
+    pub(super) dissipated: f64,
 }
 
 fn friction(law: &ContactLaw) -> (f64, f64) {
@@ -242,14 +242,14 @@ impl Resting {
     }
 
     /// Ends what contacts at rest still approach: velocities, as of now, in place. Gives what was done.
-    pub(super) fn settle(&mut self, grains: &mut [Grain], flights: &mut [Flight], least: f64) -> Carried {
+    pub(super) fn settle(&mut self, grains: &mut [Grain], flights: &mut [Flight], least: f64) -> Settled {
         let approaching = self.contacts.iter().any(|contact| {
             let first = if contact.first == SURFACE { contact.velocity } else { flights[contact.first as usize].velocity };
             (flights[contact.second as usize].velocity - first).dot(&contact.normal) < -least
         });
-        let mut carried = Carried { contacts: self.contacts.len() as u32, ..Carried::default() };
+        let mut settled = Settled::default();
         if !approaching {
-            return carried;
+            return settled;
         }
         let mut velocities: Vec<_> = flights.iter().map(|flight| flight.velocity).collect();
         let mut spins: Vec<_> = grains.iter().map(|grain| grain.spin).collect();
@@ -265,34 +265,24 @@ impl Resting {
             (flight.velocity, grain.spin) = (*velocity, *spin);
         }
         for contact in contacts.iter().filter(|contact| contact.first == SURFACE) {
-            carried.impulse_surface += contact.normal * contact.support + contact.shear;
+            settled.impulse_surface += contact.normal * contact.support + contact.shear;
         }
-        carried.dissipated_grain = before - energy(grains, flights);
-        carried
+        settled.dissipated = before - energy(grains, flights);
+        settled
     }
 
     /// Angular acceleration of a grain, rad/s².
     pub(super) fn angular(&self, grain: usize) -> Vector3<f64> {
+        if self.contacts.is_empty() {
+            return Vector3::zeros();
+        }
         self.angular.get(grain).copied().unwrap_or_else(Vector3::zeros)
     }
 
-    /// Force of the surface on all grains at rest, N, and the power (W) that contacts take from grains that move with the velocities of `flights`:
-    /// between grains, and at the surface.
-    pub(super) fn force_and_power(&mut self, grains: &[Grain], flights: &[Flight]) -> (Vector3<f64>, [f64; 2]) {
-        let mut velocities: Vec<_> = flights.iter().map(|flight| flight.velocity).collect();
-        self.spins.clear();
-        self.spins.extend(grains.iter().map(|grain| grain.spin));
-        let field = Field { grains, flights, linear: &mut velocities, angular: &mut self.spins };
-        let (mut force, mut power) = (Vector3::zeros(), [0.0; 2]);
-        for contact in &self.contacts {
-            let push = contact.normal * contact.support + contact.shear;
-            let at_surface = contact.first == SURFACE;
-            power[usize::from(at_surface)] -= push.dot(&field.rate(contact));
-            if at_surface {
-                force += push;
-            }
-        }
-        (force, power)
+    /// Force of the surface on all grains at rest, N.
+    pub(super) fn force_of_surface(&self) -> Vector3<f64> {
+        let at_surface = self.contacts.iter().filter(|contact| contact.first == SURFACE);
+        at_surface.map(|contact| contact.normal * contact.support + contact.shear).sum()
     }
 }
 

@@ -9,13 +9,13 @@
 use std::ops::ControlFlow;
 
 use impinge_events::calendar::{Calendar, Tournament};
-use impinge_events::{Flight, Surface};
+use impinge_events::{Domain, Flight, Surface};
 use nalgebra::Vector3;
 
 use super::event_driven::Held;
 use super::resting::Resting;
 use super::{Broken, EventDriven, Kick, Laws, Observer, Passage, Progress, Rest};
-use crate::grains::{Grain, NewGrain};
+use crate::grains::{Grain, NewGrain, kinetic_energy};
 use crate::near_field::{ForceSum, Singular};
 
 /// What acts on grains between events.
@@ -40,12 +40,60 @@ pub struct Substepped<S: Surface, C: Calendar = Tournament> {
     step_end: f64,
     /// What acted on each grain at the last kick, m/s², without what contacts carry.
     pull: Vec<Vector3<f64>>,
+    /// How each grain went into the sub-step.
+    starts: Vec<Start>,
+    domain: Domain,
     /// Total of what forces and contacts at rest did until the last kick.
     books: Books,
     /// The same as last told to observers.
     told: Books,
     passages: Passages,
     steps: u64,
+}
+
+/// Approach, as a part of what the strongest force gives in a sub-step, that contacts at rest may keep.
+const SETTLED: f64 = 1e-6;
+
+/// How a grain went into a sub-step, so that the work done on it can be booked.
+#[derive(Clone, Copy, Debug)]
+struct Start {
+    /// The grain that was in this place.
+    id: u64,
+    /// m
+    position: Vector3<f64>,
+    /// What acted on it, m/s².
+    pull: Vector3<f64>,
+    /// What contacts carried, m/s².
+    carried: Vector3<f64>,
+}
+
+const NOBODY: Start =
+    Start { id: u64::MAX, position: Vector3::new(0.0, 0.0, 0.0), pull: Vector3::new(0.0, 0.0, 0.0), carried: Vector3::new(0.0, 0.0, 0.0) };
+
+/// Accelerations of a grain on both sides of a kick, m/s².
+struct Change {
+    /// At the end of the sub-step before, contacts included.
+    end: Vector3<f64>,
+    /// What acts now.
+    pull: Vector3<f64>,
+    /// What contacts carry now.
+    carried: Vector3<f64>,
+}
+
+impl Start {
+    /// Work of contacts and of the near field (J) on a grain that was displaced by `moved` (m) with a chord of `velocity` (m/s), until after a kick
+    /// that ends a sub-step of length `step` (s): force times way within the sub-step, and what the change of forces does to the velocity at
+    /// its end. Gravity does not change.
+    fn work(&self, moved: Vector3<f64>, velocity: Vector3<f64>, change: &Change, gravity: Vector3<f64>, step: f64) -> (f64, f64) {
+        let Change { end, pull, carried } = *change;
+        let mean = velocity + (end + pull + carried) * (0.25 * step);
+        // Without a near field all that was added within the sub-step came from contacts.
+        let no_near_field = pull == gravity && self.pull == gravity;
+        let carried_end = if no_near_field { end - gravity } else { self.carried };
+        let contacts = self.carried.dot(&moved) + (carried - carried_end).dot(&mean) * (0.5 * step);
+        let near_field = (self.pull - gravity).dot(&moved) + (pull + carried_end - end).dot(&mean) * (0.5 * step);
+        (contacts, near_field)
+    }
 }
 
 /// What forces and contacts at rest did, in all.
@@ -119,13 +167,15 @@ impl<S: Surface, C: Calendar> Substepped<S, C> {
     pub fn new(engine: EventDriven<S, C>, forces: Forces, laws: Laws, step: f64) -> Self {
         let step_end = engine.time();
         Self {
-            engine,
             forces,
             laws,
             resting: Resting::default(),
             step: rounded(step),
             step_end,
             pull: Vec::new(),
+            starts: Vec::new(),
+            domain: engine.domain(),
+            engine,
             books: Books::default(),
             told: Books::default(),
             passages: Passages::default(),
@@ -161,13 +211,14 @@ impl<S: Surface, C: Calendar> Substepped<S, C> {
     fn kick(&mut self) -> Result<(), Broken> {
         let ended = if self.steps == 0 { 0.0 } else { self.step };
         self.books.held(&self.engine.take_held());
-        let Self { engine, forces, laws, resting, pull, books, step, .. } = self;
+        let Self { engine, forces, laws, resting, pull, starts, domain, books, step, .. } = self;
         let step = *step;
         let strongest = pull.iter().map(|pull| pull.norm()).fold(forces.gravity.norm(), f64::max);
         let reach = Resting::reach(engine.largest_radius(), 2.0 * strongest, step);
         let (gravity, mut outcome) = (forces.gravity, Ok(()));
         let near_field = forces.near_field.as_ref().map(|sum| *sum.law());
         engine.start_sub_step(reach, gravity, near_field, |surface, touches, grains, flights, accelerations| {
+            let end = accelerations.to_vec();
             outcome = forces.pull(grains, flights, pull);
             accelerations.copy_from_slice(pull);
             let strongest = pull.iter().map(|pull| pull.norm()).fold(0.0, f64::max);
@@ -175,30 +226,30 @@ impl<S: Surface, C: Calendar> Substepped<S, C> {
             let both = 0.5 * (ended + step);
             if !resting.is_empty() {
                 resting.carry(grains, flights, accelerations, step);
-                let (force, [in_grains, at_surface]) = resting.force_and_power(grains, flights);
-                books.impulse_surface += force * both;
-                books.dissipated_grain += in_grains * both;
-                books.dissipated_surface += at_surface * both;
+                books.impulse_surface += resting.force_of_surface() * both;
             }
-            for (slot, (flight, acceleration)) in flights.iter_mut().zip(&*accelerations).enumerate() {
-                books.work_near_field += (pull[slot] - gravity).dot(&flight.velocity) * (grains[slot].mass * 0.5 * ended);
-                flight.velocity += acceleration * (0.5 * ended);
-                grains[slot].spin += resting.angular(slot) * both;
-            }
-            let least = 1e-6 * strongest * step;
-            let carried = resting.settle(grains, flights, least);
-            books.impulse_surface += carried.impulse_surface;
-            books.dissipated_grain += carried.dissipated_grain;
-            for (slot, (flight, acceleration)) in flights.iter_mut().zip(&*accelerations).enumerate() {
-                if flight.radius == 0.0 {
-                    continue;
+            starts.resize(flights.len(), NOBODY);
+            for (slot, flight) in flights.iter_mut().enumerate().filter(|(_, flight)| flight.radius > 0.0) {
+                let (start, grain) = (&mut starts[slot], &mut grains[slot]);
+                let (pull, carried) = (pull[slot], accelerations[slot] - pull[slot]);
+                if start.id == grain.id {
+                    let change = Change { end: end[slot], pull, carried };
+                    let moved = domain.nearest(flight.position - start.position);
+                    let (contacts, near_field) = start.work(moved, flight.velocity, &change, gravity, ended);
+                    books.dissipated_grain -= contacts * grain.mass;
+                    books.work_near_field += near_field * grain.mass;
                 }
+                *start = Start { id: grain.id, position: flight.position, pull, carried };
+                flight.velocity += accelerations[slot] * (0.5 * ended);
+                books.dissipated_grain += rotate(flight, grain, resting.angular(slot) * both);
+                books.impulse_gravity += gravity * (grain.mass * both);
+                books.impulse_near_field += (pull - gravity) * (grain.mass * both);
+            }
+            let settled = resting.settle(grains, flights, SETTLED * strongest * step);
+            books.impulse_surface += settled.impulse_surface;
+            books.dissipated_grain += settled.dissipated;
+            for (flight, acceleration) in flights.iter_mut().zip(&*accelerations) {
                 flight.velocity += acceleration * (0.5 * step);
-                let mass = grains[slot].mass;
-                let near_field = pull[slot] - gravity;
-                books.impulse_gravity += gravity * (mass * both);
-                books.impulse_near_field += near_field * (mass * both);
-                books.work_near_field += near_field.dot(&flight.velocity) * (mass * 0.5 * step);
             }
             (step, strongest)
         });
@@ -266,6 +317,13 @@ impl<S: Surface, C: Calendar> Substepped<S, C> {
     pub fn resting(&self) -> u32 {
         self.resting.count()
     }
+}
+
+/// Turns a grain by `more` (rad/s) and tells how much energy (J) that took.
+fn rotate(flight: &Flight, grain: &mut Grain, more: Vector3<f64>) -> f64 {
+    let before = kinetic_energy(flight, grain);
+    grain.spin += more;
+    before - kinetic_energy(flight, grain)
 }
 
 /// A length of sub-steps of few digits (2^-26 of itself), so that their sum is exact for a hundred million of them.
