@@ -63,11 +63,16 @@ impl Simulation {
         if scene.domain.planar {
             surface.check_planar()?;
         }
-        let overlap = |centre, radius| {
-            let (element, depth) = surface.overlaps(centre, radius)?;
+        // Which surface a grain would be in, and how deep (m), after so many seconds.
+        let overlap = |centre, radius, after| {
+            let (element, depth) = surface.overlaps(centre, radius, after)?;
             Some((surface.number_of(element), depth))
         };
-        let placed = source::place(scene, folder, &overlap)?;
+        let placed = source::place(scene, folder, &|centre, radius| overlap(centre, radius, 0.0))?;
+        for nozzle in &placed.nozzles {
+            let after = nozzle.opens() - scene.run.start;
+            nozzle.check_clear(&|centre, radius| overlap(centre, radius, after))?;
+        }
         let scheme = EventDriven::new(&placed.grains, surface, domain(scene), laws(scene)?, scene.run.start);
         let moments = |count| Moments::new(scene.run.start, scene.run.until, count);
         Ok(Self {
@@ -105,8 +110,11 @@ impl Simulation {
                 }
                 Stop::Entry(nozzle) => {
                     let Self { scheme, nozzles, .. } = self;
-                    let entering =
-                        nozzles[nozzle].enter(time, &mut |place, radius| scheme.is_free(place, radius, time));
+                    let entering = nozzles[nozzle].enter(time, &mut |place, radius| {
+                        let inside = scheme.surface().overlaps(place, radius, time - scheme.epoch_start());
+                        inside.is_none_or(|(_, depth)| source::just_touches(depth, radius))
+                            && scheme.is_free(place, radius, time)
+                    });
                     if let Some(grain) = entering {
                         scheme.enter(time, &grain, observer);
                     }

@@ -1,8 +1,12 @@
 //! Nozzles: flow, places and directions of the grains that come out, and what happens when there is no room.
 
+use std::f64::consts::SQRT_2;
+use std::ops::ControlFlow;
+
 use approx::assert_relative_eq;
 use impinge::grains::{NewGrain, sphere_volume};
 use impinge::scene::{Invalid, Scene, Source};
+use impinge::simulation::Simulation;
 use impinge::source::Nozzle;
 use nalgebra::Vector3;
 
@@ -246,6 +250,78 @@ fn deferral_does_not_favour_small_grains() {
     assert!(nozzle.deferred() > 10, "the test must see deferrals: {}", nozzle.deferred());
     let mean = grains.iter().map(|grain| grain.radius).sum::<f64>() / grains.len() as f64;
     assert_relative_eq!(mean, 0.01, max_relative = 0.03);
+}
+
+/// A nozzle of 0.4 m by 0.4 m (or round) that blows grains of radius 0.01 m down from z = 1 m, and a surface.
+fn beside(shape: &str, start: f64, surface: &str) -> Result<Simulation, Invalid> {
+    let text = format!(
+        "run.until = 1.0\ndomain = {{ {ROOM} }}\ngrain = {{ radius = 0.01, density = 2500.0 }}\n\
+         contact = {{ grain = {{ restitution = 0.8 }}, surface = {{ restitution = 0.8, friction = 0.4 }} }}\n\
+         [[source]]\nkind = \"nozzle\"\ncentre = [0.0, 0.0, 1.0]\naxis = [0.0, 0.0, -1.0]\nspeed = 20.0\n{shape}\n\
+         flow = {{ number_flux = 500.0 }}\nstart = {start}\n[[surface]]\n{surface}\n"
+    );
+    let scene: Scene = toml::from_str(&text).unwrap_or_else(|error| panic!("{error}"));
+    Simulation::new(&scene, ".".as_ref())
+}
+
+const SQUARE: &str = "shape = { slot = { width = 0.4, breadth = 0.4, along = [1.0, 0.0, 0.0] } }";
+
+/// Grains that entered inside the surface stopped the run with a request to report the scene.
+#[test]
+fn a_mouth_in_the_surface_was_not_seen() {
+    let floor = |z: f64| format!("kind = \"plane\"\npoint = [0, 0, {z}]\nnormal = [0, 0, 1]");
+    let tilted = |z: f64| format!("kind = \"plane\"\npoint = [0, 0, {z}]\nnormal = [1, 0, 1]");
+    let plate = |z: f64| {
+        format!("kind = \"rectangle\"\ncentre = [0, 0, {z}]\nnormal = [0, 0, 1]\nalong = [1, 0, 0]\nsize = [3, 3]")
+    };
+    // A blade of height 0.2 that stands upright beside the mouth, or in it, as wide as a grain.
+    let blade = |x: f64| {
+        format!("kind = \"rectangle\"\ncentre = [{x}, 0, 1]\nnormal = [1, 0, 0]\nalong = [0, 1, 0]\nsize = [0.02, 0.2]")
+    };
+    // A plate that falls past the mouth at 10 m/s, from 1 m above it.
+    let falling = || format!("{}\nvelocity = [0, 0, -10]", plate(2.0));
+    // Where the tilted plane touches grains at the rim.
+    let touch = 1.0 - 0.2 - 0.01 * SQRT_2;
+    for (shape, start, surface, clear) in [
+        (CIRCLE, 0.0, floor(0.99), true),
+        (CIRCLE, 0.0, floor(0.9901), false),
+        (CIRCLE, 0.0, floor(3.0), false),
+        (CIRCLE, 0.0, tilted(touch - 1e-6), true),
+        (CIRCLE, 0.0, tilted(touch + 1e-3), false),
+        (SQUARE, 0.0, plate(0.9899), true),
+        (SQUARE, 0.0, plate(1.0101), true),
+        (SQUARE, 0.0, plate(1.0), false),
+        (SQUARE, 0.0, plate(0.995), false),
+        (SQUARE, 0.0, blade(0.2101), true),
+        (SQUARE, 0.0, blade(0.209), false),
+        (SQUARE, 0.0, blade(0.1234), false),
+        (CIRCLE, 0.0, blade(-0.2101), true),
+        (CIRCLE, 0.0, blade(-0.209), false),
+        (SQUARE, 0.0, falling(), true),
+        (SQUARE, 0.1, falling(), false),
+        (SQUARE, 0.2, falling(), true),
+    ] {
+        let made = beside(shape, start, &surface);
+        assert_eq!(made.is_ok(), clear, "{shape}, start {start}, {surface}: {:?}", made.err());
+        if let Err(invalid) = made {
+            assert_eq!(invalid.key, "source[0].centre");
+            assert!(invalid.what.contains("overlaps surface[0] by"), "{}", invalid.what);
+        }
+    }
+}
+
+/// A plate slides over the mouth, 10 m/s fast and 2 m long, and on: what is due meanwhile waits, and enters after it.
+#[test]
+fn grains_entered_inside_a_surface_that_had_moved_into_the_mouth() {
+    let plate = "kind = \"rectangle\"\ncentre = [-2.0, 0, 1]\nnormal = [0, 0, 1]\nalong = [1, 0, 0]\nsize = [2, 2]\nvelocity = [10, 0, 0]";
+    let mut simulation = beside(CIRCLE, 0.0, plate).unwrap_or_else(|invalid| panic!("{invalid}"));
+    let outcome =
+        simulation.run(&mut (), &mut |_| ControlFlow::Continue(())).unwrap_or_else(|broken| panic!("{broken}"));
+    assert_eq!(outcome.time, 1.0);
+    let nozzle = &simulation.nozzles()[0];
+    // The mouth is covered for at least the 0.16 s between the arrival of the plate at its far rim and at its near rim.
+    assert!(nozzle.deferred() >= 79, "{}", nozzle.deferred());
+    assert!(nozzle.missing(1.0) <= 1, "{}", nozzle.missing(1.0));
 }
 
 #[test]

@@ -294,13 +294,13 @@ fn a_sheet_that_moves_past_is_met_while_it_is_there() {
 #[test]
 fn grains_inside_a_surface_are_found() {
     let floor = generated(plane([0.0; 3], [0.0, 0.0, 1.0], [0.0; 3])).expect("a plane");
-    assert_eq!(floor.overlaps(Vector3::z() * 0.5, 0.5), None);
-    assert_eq!(floor.overlaps(Vector3::z() * 0.25, 0.5), Some((0, 0.25)));
-    assert_eq!(floor.overlaps(Vector3::z() * -3.0, 0.5), Some((0, 3.5)));
+    assert_eq!(floor.overlaps(Vector3::z() * 0.5, 0.5, 0.0), None);
+    assert_eq!(floor.overlaps(Vector3::z() * 0.25, 0.5, 0.0), Some((0, 0.25)));
+    assert_eq!(floor.overlaps(Vector3::z() * -3.0, 0.5, 0.0), Some((0, 3.5)));
 
     let cube = import("cube.stl", binary(&cube())).expect("a cube");
     let depth =
-        |x: f64, y: f64, z: f64, radius: f64| cube.overlaps(Vector3::new(x, y, z), radius).map(|(_, depth)| depth);
+        |x: f64, y: f64, z: f64, radius: f64| cube.overlaps(Vector3::new(x, y, z), radius, 0.0).map(|(_, depth)| depth);
     assert_eq!(depth(0.5, 0.5, 2.0, 0.5), None);
     assert_eq!(depth(0.5, 0.5, 1.25, 0.5), Some(0.25));
     assert_eq!(depth(0.5, 0.5, 0.75, 0.5), Some(0.75));
@@ -308,8 +308,8 @@ fn grains_inside_a_surface_are_found() {
     assert_eq!(depth(-0.5, -0.5, -0.5, 0.5), None);
 
     let sheet = generated(rectangle([4, 4], [0.0; 3])).expect("a sheet");
-    assert_eq!(sheet.overlaps(Vector3::z() * -0.25, 0.125), None);
-    assert_eq!(sheet.overlaps(Vector3::z() * -0.25, 0.5).map(|(_, depth)| depth), Some(0.25));
+    assert_eq!(sheet.overlaps(Vector3::z() * -0.25, 0.125, 0.0), None);
+    assert_eq!(sheet.overlaps(Vector3::z() * -0.25, 0.5, 0.0).map(|(_, depth)| depth), Some(0.25));
 }
 
 #[test]
@@ -330,5 +330,5 @@ fn the_shipped_target_is_a_closed_plate_with_dimples() {
     // In the middle of a dimple, between dimples, and beside the plate.
     assert!((landing(0.0375, 0.0375) + 0.01).abs() < 1e-4);
     assert!(landing(0.0, 0.0).abs() < 1e-15);
-    assert_eq!(surface.overlaps(Vector3::new(0.1, 0.1, -0.02), 0.001).map(|(_, depth)| depth > 0.001), Some(true));
+    assert_eq!(surface.overlaps(Vector3::new(0.1, 0.1, -0.02), 0.001, 0.0).map(|(_, depth)| depth > 0.001), Some(true));
 }

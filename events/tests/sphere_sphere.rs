@@ -67,36 +67,42 @@ fn passing(random: &mut Pcg64, s: f64, away: f64, aside: f64, speed: f64) -> (Fl
     (a, flight(along * (away * s) + side * (aside * s), along * -speed, 0.5 * s))
 }
 
-/// Worst relative error for each k of pairs with b = s (1 - 10^-k); a hit may be missed, or a miss be hit, only by less than 1e-12 s.
+/// Largest relative error of a grazing contact time: a few roundings of a float, however small the discriminant is.
+const GRAZING_ERROR: f64 = 1e-15;
+
+/// Worst relative error for each k of pairs with b = s (1 - 10^-k). No hit is missed and no miss hit: beyond the rounding of b / s
+/// itself there is none that a contact could get lost in.
 fn worst_grazing(mut pair: impl FnMut(f64) -> (Flight, Flight)) -> [f64; 16] {
     let mut worst = [0f64; 16];
     for (k, worst) in (0..).zip(&mut worst) {
         for _ in 0..2000 {
             let (a, b) = pair(1.0 - 10f64.powi(-k));
-            let deep = penetration(&a, &b);
             match (found(&a, &b), exact(&a, &b)) {
+                // Pairs that overlap already touch at once.
+                (Some(0.0), Some(exact)) if exact <= real(0.0) => {}
                 (Some(time), Some(exact)) => *worst = worst.max(relative_error(time, &exact)),
                 (None, None) => {}
-                _ => assert!(deep.abs() < 1e-12, "k = {k}: {deep:e} s deep, {a:?} {b:?}"),
+                (time, _) => panic!("k = {k}: {time:?}, {:e} s deep, {a:?} {b:?}", penetration(&a, &b)),
             }
         }
     }
     worst
 }
 
-/// The contact times hold 1e-10 up to k = 12 for pairs that set off three s apart or more, up to k = 11 for nearer ones; there k = 12
-/// comes to 1.6e-10. The discriminant is known to some 2^-52 s² v², its root to that over 2 √(2 · 10^-k), and the less far they fly
-/// the more it weighs. More would need its products in double length.
+/// PHYSICS asks for 1e-10 to k = 12. In single length, pairs nearer than 3 s came to 1.6e-10 there: the discriminant was known to some
+/// 2^-52 s² v², its root to that over 2 √(2 · 10^-k), and the less far they fly the more it weighs. In double length k = 15 is no
+/// harder than k = 7. Up to k = 6 a single length is enough; pairs that start nearly touching lose digits of r² - s² there.
 fn assert_grazing(away: f64, worst: &[f64; 16]) {
-    let last = if away >= 3.0 { 12 } else { 11 };
-    assert!(worst[..=last].iter().all(|&error| error < 1e-10), "{away} s apart: {worst:?}");
+    let single = if away < 1.0 { 1e-10 } else { 1e-12 };
+    assert!(worst[..7].iter().all(|&error| error < single), "{away} s apart: {worst:?}");
+    assert!(worst[7..].iter().all(|&error| error < GRAZING_ERROR), "{away} s apart: {worst:?}");
 }
 
 /// Hard case 10: b = s (1 - 10^-k), along an axis.
 #[test]
 fn grazing() {
     let mut random = Pcg64::seed_from_u64(10);
-    for away in [1.01, 1.1, 1.5, 3.0, 10.0, 100.0] {
+    for away in [0.01, 0.1, 0.5, 1.01, 1.1, 1.5, 3.0, 10.0, 100.0] {
         let worst = worst_grazing(|aside| {
             let s = random.random_range(0.001..0.1);
             let a = flight(Vector3::zeros(), Vector3::zeros(), 0.5 * s);
@@ -111,10 +117,46 @@ fn grazing() {
 #[test]
 fn grazing_obliquely() {
     let mut random = Pcg64::seed_from_u64(10);
-    for away in [1.5, 3.0, 10.0, 100.0] {
+    for away in [0.01, 0.1, 0.5, 1.01, 1.5, 3.0, 10.0, 100.0] {
         let worst = worst_grazing(|aside| passing(&mut random, 0.02, away, aside, 80.0));
         assert_grazing(away, &worst);
     }
+}
+
+/// With local times of their own, far from the origin and in a periodic image r is a sum of larger numbers, and its rounding must not
+/// be taken for a hit or a miss.
+#[test]
+fn grazing_after_flights_of_their_own() {
+    let mut random = Pcg64::seed_from_u64(10);
+    let mut worst = 0f64;
+    for _ in 0..20_000 {
+        let (s, away) = (0.02, random.random_range(0.5..10.0));
+        let aside = 1.0 + [-1.0, 1.0][random.random_range(0..2)] * 10f64.powf(random.random_range(-16.0..-7.0));
+        let (mut a, mut b) = passing(&mut random, s, away, aside, 80.0);
+        let (place, common, shift) = (unit(&mut random) * 100.0, unit(&mut random) * 10.0, unit(&mut random));
+        (a.velocity, b.velocity) = (a.velocity + common, b.velocity + common);
+        for flight in [&mut a, &mut b] {
+            flight.time = random.random_range(-1.0..1.0);
+            flight.position = place + flight.position_at(2.0 * flight.time);
+        }
+        // What rounding has made of the two is what the oracle sees.
+        let image = Flight { position: b.position + shift, ..b };
+        b.position = image.position - shift;
+        let base = a.time.max(b.time);
+        let time = sphere_sphere(&a, &b, shift);
+        assert_eq!(time, sphere_sphere(&b, &a, -shift));
+        let (r, v, reach) = relative(&a, &b);
+        match (time, exact_meeting(&(&r + &Exact::of(shift)), &v, &reach)) {
+            (Some(time), Some(exact)) => {
+                // All but the rounding of the time itself.
+                let error = double(&(real(time) - real(base) - &exact)).abs();
+                worst = worst.max(error / (base.abs() + double(&exact).abs()));
+            }
+            (None, None) => {}
+            (time, exact) => panic!("{time:?} instead of {:?}: {a:?} {b:?}", exact.map(|time| double(&time))),
+        }
+    }
+    assert!(worst < GRAZING_ERROR, "{worst:e}");
 }
 
 /// Hard case 11: spheres a hundred million diameters apart.
@@ -128,8 +170,8 @@ fn distant_and_fast() {
         match (found(&a, &b), exact(&a, &b)) {
             (Some(time), Some(exact)) => worst = worst.max(relative_error(time, &exact)),
             (None, None) => {}
-            // The products of r x v are 1e8 times as large as what is left of them.
-            _ => assert!(penetration(&a, &b).abs() < 8.0 * ROUNDING * 1e8, "{a:?} {b:?}"),
+            // In single length the products of r x v would be wrong by 1e8 times what is left of them.
+            _ => panic!("{:e} s deep, {a:?} {b:?}", penetration(&a, &b)),
         }
     }
     assert!(worst < 1e-9, "{worst:e}");

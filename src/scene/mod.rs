@@ -16,7 +16,7 @@ mod shape;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub(crate) use check::{LARGEST, SMALLEST};
+pub(crate) use check::{LARGEST, SMALLEST, unresolved};
 pub use check::{check, check_radius};
 pub use contact::{Collapse, Contact, Contacts, Friction, Regularised, StaticDynamic};
 pub use error::{Invalid, SceneError};
@@ -338,7 +338,8 @@ pub enum Arrangement {
 pub struct NozzleSource {
     /// Outline of the opening.
     pub shape: NozzleShape,
-    /// Centre of the opening, m.
+    /// Centre of the opening, m. All of the opening must be a grain's radius away from the surface when it starts; while a moving surface
+    /// is nearer than that, grains wait.
     pub centre: Vec3,
     /// Direction of the jet; any length but 0.
     pub axis: Vec3,

@@ -175,6 +175,12 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.time
     }
 
+    /// Simulated time at the start of the epoch, s: times of the surface count from it.
+    #[must_use]
+    pub fn epoch_start(&self) -> f64 {
+        self.epoch_start
+    }
+
     /// What the grains can hit.
     #[must_use]
     pub fn surface(&self) -> &S {
@@ -424,7 +430,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         }
     }
 
-    /// Whether a grain of this radius fits in at `position` at simulated time `time` (s).
+    /// Whether a grain of this radius (m) at `position` (m) overlaps no other at simulated time `time` (s). The surface is not asked.
     pub fn is_free(&self, position: Vector3<f64>, radius: f64, time: f64) -> bool {
         self.encounters.is_free(position, radius, time - self.epoch_start)
     }

@@ -21,7 +21,7 @@ use nalgebra::Vector3;
 pub use nozzle::Nozzle;
 
 use crate::grains::NewGrain;
-use crate::scene::{Boundary, Domain, Invalid, Scene, Source};
+use crate::scene::{Boundary, Domain, Invalid, Scene, Source, unresolved};
 use cells::Cells;
 use context::Context;
 
@@ -166,8 +166,11 @@ fn check_alone(
         return refuse(&what, "move the grain or enlarge the domain");
     }
     check_period(domain, grain.radius)?;
+    if let Some((what, remedy)) = unresolved(grain.radius, domain) {
+        return Err(Invalid::new(origins.key(id), format!("{}: {what}", origins.name(id)), remedy));
+    }
     match surface_overlap(grain.position, grain.radius) {
-        Some((surface, depth)) if depth > OVERLAP_TOLERANCE * grain.radius => {
+        Some((surface, depth)) if !just_touches(depth, grain.radius) => {
             refuse(&format!("overlaps surface[{surface}] by {depth:.3e} m"), "move the grain away from the surface")
         }
         _ => Ok(()),
@@ -209,7 +212,7 @@ fn check_neighbours(
     let mut partner = None;
     cells.any_near(grain.position, grain.radius, |item, offset| {
         let depth = grain.radius + item.radius - offset.norm();
-        if depth > OVERLAP_TOLERANCE * grain.radius.min(item.radius) {
+        if !just_touches(depth, grain.radius.min(item.radius)) {
             partner = Some((item.id as usize, depth));
         }
         partner.is_some()
@@ -242,6 +245,12 @@ fn remedy_for_overlap(scene: &Scene, first: usize, second: usize) -> String {
         }
         _ => "move one of the sources".to_string(),
     }
+}
+
+/// Whether an overlap of this depth (m) is no more than rounding for a grain of this radius (m).
+#[must_use]
+pub(crate) fn just_touches(depth: f64, radius: f64) -> bool {
+    depth <= OVERLAP_TOLERANCE * radius
 }
 
 /// Whether a centre lies in the domain; NaN does not.

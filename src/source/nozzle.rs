@@ -1,5 +1,6 @@
 //! Grains that keep coming out of a nozzle (Arbelaez et al. 2009, sections 2 and 8).
 
+use std::collections::VecDeque;
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::Vector3;
@@ -8,7 +9,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::context::Context;
 use super::radius::Radii;
-use super::{is_inside, value};
+use super::{brief, is_inside, just_touches, value};
 use crate::grains::{NewGrain, sphere_volume};
 use crate::scene::{Boundary, Flow, Invalid, NozzleShape, NozzleSource, Scene};
 
@@ -20,13 +21,20 @@ const PLACES_PER_ATTEMPT: u32 = 64;
 /// that are in its way have then moved on by a quarter of what they must.
 const RETRY_FLIGHT: f64 = 0.25;
 
+/// Places at which an opening is tried for an overlap with the surface; it is halved again and again where it is not clear of it.
+///
+/// They are a 64th of its width apart if the surface runs along all of the opening, and much nearer to each other if it comes near at the
+/// rim only. Consequence: an overlap between such places may be passed over; grains then keep clear of it one by one.
+const PLACES_PER_CHECK: usize = 1 << 14;
+
 /// An opening through which grains enter the scene.
 ///
 /// Grain number k (from 0) is due at start + (k + u_k) / flux, with u_k drawn evenly from 0 to 1: entries are irregular, but
 /// never is the number of grains that are due more than one away from flux times duration. Each enters at a place drawn
 /// evenly over the opening. Where no place is free the grain is deferred and tried again shortly after, with the same
 /// radius (dropping it would favour small grains); those that wait behind it keep their own times, and so the flow catches
-/// up as soon as there is room. What has been deferred is counted.
+/// up as soon as there is room. What has been deferred is counted. A place is free where the grain overlaps no other and no surface:
+/// the opening must be clear of the surface when the nozzle opens, but a moving one may reach it later.
 ///
 /// The number flux follows from a volume fraction φ as φ A v / V, with A the area of the opening, v the speed and V the
 /// mean volume of a grain. In a planar scene φ is an area fraction, A the width of the opening and V the mean area of the
@@ -36,6 +44,8 @@ const RETRY_FLIGHT: f64 = 0.25;
 /// All times are simulated times, s.
 #[derive(Clone, Debug)]
 pub struct Nozzle {
+    /// Its number among the sources of the scene.
+    number: usize,
     opening: Opening,
     speed: f64,
     spin: Vector3<f64>,
@@ -50,6 +60,9 @@ pub struct Nozzle {
     entered: u64,
     deferred: u64,
 }
+
+/// In which surface of the scene a grain with this centre (m) and radius (m) lies the deepest, and how deep (m).
+type Overlap<'a> = dyn Fn(Vector3<f64>, f64) -> Option<(usize, f64)> + 'a;
 
 /// The grain that enters next.
 #[derive(Clone, Copy, Debug)]
@@ -90,6 +103,7 @@ impl Nozzle {
             }
         };
         let mut nozzle = Self {
+            number,
             opening,
             speed,
             spin: context.spin(source.spin)?,
@@ -106,6 +120,33 @@ impl Nozzle {
         };
         nozzle.waiting = nozzle.next();
         Ok(nozzle)
+    }
+
+    /// When it opens, s.
+    #[must_use]
+    pub(crate) fn opens(&self) -> f64 {
+        self.start
+    }
+
+    /// Refuses a nozzle whose grains would enter inside the surface.
+    ///
+    /// `surface_overlap` gets the centre (m) and radius (m) of a grain and says in which surface of the scene it lies the deepest when the
+    /// nozzle opens and how deep (m), or `None`.
+    ///
+    /// # Errors
+    /// A place of the opening where a grain of mean radius overlaps a surface.
+    pub(crate) fn check_clear(&self, surface_overlap: &Overlap<'_>) -> Result<(), Invalid> {
+        let radius = self.radii.mean();
+        let Some((place, surface, depth)) = self.opening.overlap(radius, surface_overlap) else { return Ok(()) };
+        let [x, y, z] = place.data.0[0].map(brief);
+        Err(Invalid::new(
+            format!("source[{}].centre", self.number),
+            format!(
+                "a grain of radius {} m that enters at ({x}, {y}, {z}) overlaps surface[{surface}] by {depth:.3e} m",
+                brief(radius)
+            ),
+            "move the nozzle away from the surface, or make its opening smaller",
+        ))
     }
 
     /// When the next grain is due (s), or `None` when the nozzle has stopped.
@@ -305,6 +346,49 @@ impl Opening {
             ),
             "move the nozzle or enlarge the domain",
         ))
+    }
+
+    /// A place of the opening (m) where a grain of this radius (m) overlaps a surface, which one, and how deep (m).
+    ///
+    /// A rectangle of the opening is clear when a grain larger by half its diagonal is clear of the surface in its middle, or in the place
+    /// nearest to that: no place of a round opening is further from it.
+    fn overlap(&self, radius: f64, surface_overlap: &Overlap<'_>) -> Option<(Vector3<f64>, usize, f64)> {
+        let breadth = match self.outline {
+            Outline::Round => self.half_width,
+            Outline::Straight(half) => half,
+            Outline::Line => 0.0,
+        };
+        // Middle and half sides of rectangles that are not known to be clear, m across and along; the largest first.
+        let mut rectangles = VecDeque::from([([0.0, 0.0], [self.half_width, breadth])]);
+        for _ in 0..PLACES_PER_CHECK {
+            let (middle, mut half) = rectangles.pop_front()?;
+            let place = self.nearest(middle);
+            match surface_overlap(place, radius) {
+                Some((surface, depth)) if !just_touches(depth, radius) => return Some((place, surface, depth)),
+                _ => {}
+            }
+            if surface_overlap(place, radius + half[0].hypot(half[1])).is_some() {
+                let longer = usize::from(half[1] > half[0]);
+                half[longer] *= 0.5;
+                for step in [-half[longer], half[longer]] {
+                    let mut middle = middle;
+                    middle[longer] += step;
+                    rectangles.push_back((middle, half));
+                }
+            }
+        }
+        None
+    }
+
+    /// The place of the opening (m) that is nearest to a point of its plane, given in m across and along.
+    fn nearest(&self, point: [f64; 2]) -> Vector3<f64> {
+        let outside = if self.outline == Outline::Round { point[0].hypot(point[1]) / self.half_width } else { 0.0 };
+        let [x, y] = point.map(|x| x / outside.max(1.0));
+        let mut place = self.centre + x * self.across + y * self.along;
+        if self.outline == Outline::Line {
+            place.y = 0.0;
+        }
+        place
     }
 
     /// Area (m²) of the opening and a margin (m) around it; in a planar scene the width, m.

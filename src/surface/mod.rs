@@ -116,12 +116,12 @@ impl Surface {
         })
     }
 
-    /// Whether a grain at rest at `position` (m) is inside a surface at the start of the epoch: it reaches below a plane, cuts a
+    /// Whether a grain at rest at `position` (m) is inside a surface at `time` (s, epoch time): it reaches below a plane, cuts a
     /// triangle, or has its centre inside a watertight mesh, which is taken for solid (a vessel needs an opening, or walls with an
     /// inside and an outside). Says into which element it reaches the deepest, and how deep (m).
     #[must_use]
-    pub fn overlaps(&self, position: Vector3<f64>, radius: f64) -> Option<(u32, f64)> {
-        let overlaps = self.parts.iter().filter_map(|part| part.overlap(position - part.offset, radius));
+    pub fn overlaps(&self, position: Vector3<f64>, radius: f64, time: f64) -> Option<(u32, f64)> {
+        let overlaps = self.parts.iter().filter_map(|part| part.overlap(position - part.displacement(time), radius));
         overlaps.reduce(|deepest, other| if other.1 > deepest.1 { other } else { deepest })
     }
 
@@ -250,8 +250,14 @@ impl Part {
         if !self.moves {
             return *flight;
         }
-        let displacement = self.offset + self.velocity * flight.time;
-        Flight { position: flight.position - displacement, velocity: flight.velocity - self.velocity, ..*flight }
+        let position = flight.position - self.displacement(flight.time);
+        Flight { position, velocity: flight.velocity - self.velocity, ..*flight }
+    }
+
+    /// How far this surface has moved by `time` (s, epoch time), m.
+    #[inline]
+    fn displacement(&self, time: f64) -> Vector3<f64> {
+        self.offset + self.velocity * time
     }
 
     /// The size of the speeds whose difference a relative velocity is, m/s.

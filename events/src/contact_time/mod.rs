@@ -1,8 +1,10 @@
 //! When do two things touch? One file a pair; every function is pure: states in, time out.
 
+mod grazing;
 mod sphere_plane;
 mod sphere_sphere;
 mod sphere_triangle;
+mod wide;
 
 pub use sphere_plane::sphere_plane;
 pub use sphere_sphere::{sphere_sphere, spheres_may_touch};

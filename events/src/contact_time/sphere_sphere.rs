@@ -2,6 +2,8 @@
 
 use nalgebra::Vector3;
 
+use super::grazing::{self, GRAZING};
+use super::wide::{Wide, WideVector};
 use super::{APPROACH_ROUNDING, STANDSTILL};
 use crate::Flight;
 
@@ -12,7 +14,11 @@ use crate::Flight;
 /// With r and v the relative position and velocity at the later of the two local times and s the sum of the radii,
 /// contact is at t = (r² - s²) / (-b + √G), b = r·v, G = s² v² - |r × v|². The paper prints (-b ± √G) / v², which
 /// cancels for distant and for touching pairs; this is the same root (the earlier one) without the cancellation, and the
-/// same holds of G against b² - v² (r² - s²).
+/// same holds of G against b² - v² (r² - s²). Where the two all but miss each other G is a small difference again, and is taken in
+/// double length.
+///
+/// The two states are taken for exact. A grazing contact then comes out to 1e-15 of the interval after the later local time, any
+/// other to what r and r² - s² have lost by rounding.
 ///
 /// Spheres that overlap and approach touch at once, those that overlap and recede do not (Bannerman et al. 2014): then no
 /// rounding can lose a collision or resolve one twice. The result is the same bit for bit when `a` and `b` change places
@@ -41,7 +47,7 @@ pub fn sphere_sphere(a: &Flight, b: &Flight, shift: Vector3<f64>) -> Option<f64>
     if approach > 0.0 {
         let v2 = v.norm_squared();
         let interval =
-            if v2 >= SMALLEST_SPEED_SQUARED { meeting(a, b, r, v, approach, v2) } else { slow_meeting(a, b, r, v) };
+            if v2 >= SMALLEST_SPEED_SQUARED { meeting(a, b, shift, r, v) } else { slow_meeting(a, b, shift, r, v) };
         return interval.map(|interval| base + interval);
     }
     None
@@ -74,30 +80,50 @@ const SMALLEST_SPEED_SQUARED: f64 = 1e-280;
 
 /// Interval until contact of a pair that approaches, s.
 #[inline]
-fn meeting(a: &Flight, b: &Flight, r: Vector3<f64>, v: Vector3<f64>, approach: f64, v2: f64) -> Option<f64> {
+fn meeting(a: &Flight, b: &Flight, shift: Vector3<f64>, r: Vector3<f64>, v: Vector3<f64>) -> Option<f64> {
     let s = a.radius + b.radius;
-    let reach = s * s * v2 - r.cross(&v).norm_squared();
-    if reach < 0.0 {
+    let most = s * s * v.norm_squared();
+    let across = r.cross(&v).norm_squared();
+    if across > most * (1.0 + GRAZING) {
         return None;
     }
+    let approach = -r.dot(&v);
     let speeds = a.velocity.amax() + b.velocity.amax();
     if approach <= APPROACH_ROUNDING * speeds * s {
         return None;
+    }
+    let reach = most - across;
+    if reach < GRAZING * most {
+        return grazing_meeting(a, b, shift);
     }
     let separation = r.norm_squared() - s * s;
     Some(separation.max(0.0) / (approach + reach.sqrt()))
 }
 
+/// The same for a pair that all but misses, from the states themselves.
+#[cold]
+#[inline(never)]
+fn grazing_meeting(a: &Flight, b: &Flight, shift: Vector3<f64>) -> Option<f64> {
+    let base = a.time.max(b.time);
+    let place = |flight: &Flight| {
+        WideVector::from(flight.position) + WideVector::from(flight.velocity).times(Wide::sum(base, -flight.time))
+    };
+    // Where a and b change places (and the shift its sign), r and v change their signs and not a bit more.
+    let r = place(b) - place(a) + shift.into();
+    let v = WideVector::from(b.velocity) - a.velocity.into();
+    let s = Wide::sum(a.radius, b.radius);
+    grazing::interval(&r, &v, s * s, 0.0)
+}
+
 /// The same for grains so slow that squares of their speeds underflow, as at the end of a collapse: in units of time in which
 /// their speeds are near 1. The unit is a power of two, so nothing is rounded.
 #[cold]
-fn slow_meeting(a: &Flight, b: &Flight, r: Vector3<f64>, v: Vector3<f64>) -> Option<f64> {
+fn slow_meeting(a: &Flight, b: &Flight, shift: Vector3<f64>, r: Vector3<f64>, v: Vector3<f64>) -> Option<f64> {
     let fastest = a.velocity.amax().max(b.velocity.amax());
     if fastest < STANDSTILL {
         return None;
     }
     let unit = 2f64.powi(fastest.log2().floor().min(0.0) as i32);
-    let scaled = |flight: &Flight| Flight { velocity: flight.velocity / unit, ..*flight };
-    let v = v / unit;
-    meeting(&scaled(a), &scaled(b), r, v, -r.dot(&v), v.norm_squared()).map(|interval| interval / unit)
+    let scaled = |flight: &Flight| Flight { velocity: flight.velocity / unit, time: flight.time * unit, ..*flight };
+    meeting(&scaled(a), &scaled(b), shift, r, v / unit).map(|interval| interval / unit)
 }

@@ -12,6 +12,8 @@
 
 use nalgebra::Vector3;
 
+use super::grazing::{self, GRAZING};
+use super::wide::{Wide, WideVector};
 use super::{APPROACH_ROUNDING, STANDSTILL};
 use crate::Flight;
 
@@ -41,6 +43,9 @@ const STEEPEST_GRAZING: f64 = 1e6;
 /// Rounding decides whether it does, and the speed of arrival that it would see is the square root of rounding. Consequence: an
 /// overlap of 2e-15 radii.
 const SLIDING: f64 = 1.0 / (1u64 << 49) as f64;
+
+/// The same as a part of s² v²: below it, the discriminant s² v² - |r × v|² counts for none.
+const GRAZED: f64 = 2.0 * SLIDING;
 
 /// Triangles flatter than this (height over longest side) have no normal that could be trusted to six digits.
 const FLATTEST: f64 = 1e-10;
@@ -225,7 +230,7 @@ impl Edge {
     pub fn contact(&self, sweep: &Sweep, outward: &[Vector3<f64>]) -> Option<f64> {
         let (along, across) = self.split(sweep.position - self.origin);
         let (drift, velocity) = self.split(sweep.velocity);
-        let interval = round_contact(&across, &velocity, sweep)?;
+        let interval = round_contact(&across, &velocity, sweep, || self.grazing_contact(sweep))?;
         let arm = across + velocity * interval;
         let place = along + drift * interval;
 
@@ -235,6 +240,20 @@ impl Edge {
         let within = place >= -border && place <= self.length + border;
         let crease = CREASE * arm.norm();
         (within && outward.iter().all(|outward| arm.dot(outward) > crease)).then_some(interval)
+    }
+
+    /// The same for a sphere that all but misses the line of the edge, as origin and direction have it.
+    ///
+    /// The product with the direction turns what is across the edge by a right angle and makes it longer by |d|, which is 1 to
+    /// rounding only, and so does |d| with the radius.
+    #[cold]
+    #[inline(never)]
+    fn grazing_contact(&self, sweep: &Sweep) -> Option<f64> {
+        let direction = WideVector::from(self.direction);
+        let r = (WideVector::from(sweep.position) - self.origin.into()).cross(&direction);
+        let v = WideVector::from(sweep.velocity).cross(&direction);
+        let s = Wide::from(sweep.radius);
+        grazing::interval(&r, &v, s * s * direction.dot(&direction), GRAZED)
     }
 
     /// A vector along and across the edge.
@@ -269,18 +288,33 @@ impl Edge {
 #[must_use]
 pub fn sphere_corner(sweep: &Sweep, point: &Vector3<f64>, spokes: &[Vector3<f64>]) -> Option<f64> {
     let start = sweep.position - point;
-    let interval = round_contact(&start, &sweep.velocity, sweep)?;
+    let interval = round_contact(&start, &sweep.velocity, sweep, || grazing_corner(sweep, point))?;
     let arm = start + sweep.velocity * interval;
     let crease = -CREASE * arm.norm();
     spokes.iter().all(|spoke| arm.dot(spoke) < crease).then_some(interval)
 }
 
+/// The contact with a corner that the sphere all but misses.
+#[cold]
+#[inline(never)]
+fn grazing_corner(sweep: &Sweep, point: &Vector3<f64>) -> Option<f64> {
+    let r = WideVector::from(sweep.position) - (*point).into();
+    let s = Wide::from(sweep.radius);
+    grazing::interval(&r, &sweep.velocity.into(), s * s, GRAZED)
+}
+
 /// Interval until |r + v t| is one radius: for a corner, and across an edge.
 ///
 /// The root of [`sphere_sphere`](super::sphere_sphere), here with the impact parameter m = |r × v| / |v|:
-/// t = (|r| - s) (|r| + s) / (-r·v + |v| √((s - m) (s + m))). Overlapping and approaching touches at once.
+/// t = (|r| - s) (|r| + s) / (-r·v + |v| √((s - m) (s + m))). Overlapping and approaching touches at once. Where the root is small
+/// against s, `in_double_length` tells.
 #[inline]
-fn round_contact(r: &Vector3<f64>, v: &Vector3<f64>, sweep: &Sweep) -> Option<f64> {
+fn round_contact(
+    r: &Vector3<f64>,
+    v: &Vector3<f64>,
+    sweep: &Sweep,
+    in_double_length: impl FnOnce() -> Option<f64>,
+) -> Option<f64> {
     let approach = -r.dot(v);
     if approach > 0.0 {
         let s = sweep.radius;
@@ -290,7 +324,10 @@ fn round_contact(r: &Vector3<f64>, v: &Vector3<f64>, sweep: &Sweep) -> Option<f6
         }
         let speed = v.norm();
         let miss = r.cross(v).norm() / speed;
-        if miss <= s * (1.0 - SLIDING) {
+        if miss <= s * (1.0 + 0.5 * GRAZING) {
+            if miss > s * (1.0 - 0.5 * GRAZING) {
+                return in_double_length();
+            }
             return Some((distance - s) * (distance + s) / (approach + speed * ((s - miss) * (s + miss)).sqrt()));
         }
     }
