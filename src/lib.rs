@@ -22,6 +22,7 @@
 
 pub mod grains;
 pub mod law;
+pub mod near_field;
 pub mod observe;
 pub mod output;
 pub mod scene;

@@ -1,8 +1,10 @@
 //! What happens at a contact: states in, impulse out; no file, no chance, no engine.
 
 mod impulse;
+pub(crate) mod near_field;
 
 pub use impulse::{Body, Impulse, PairImpulse, SurfaceImpulse, resolve_pair, resolve_surface};
+pub use near_field::{InvalidTerm, NearField, Term};
 
 use crate::scene;
 
