@@ -65,29 +65,6 @@ impl NearField {
     pub fn switch_from(&self) -> Option<f64> {
         self.cutoff.map(|cutoff| self.switch.unwrap_or(DEFAULT_SWITCH * cutoff))
     }
-
-    /// Force at distance `r` (m) between two grains of strength 1, N; attraction is positive.
-    #[must_use]
-    pub fn attraction(&self, r: f64) -> f64 {
-        // Without the strength of 0 an infinite power would make no number of no force.
-        let term = |alpha: f64, beta: f64| if alpha == 0.0 { 0.0 } else { alpha * r.powf(-beta) };
-        term(self.alpha1, self.beta1) - term(self.alpha2, self.beta2)
-    }
-
-    /// Distance at which attraction and repulsion balance, m: (alpha2 / alpha1)^(1 / (beta2 - beta1)). None where one of the two is always
-    /// stronger.
-    ///
-    /// ```
-    /// use impinge::scene::NearField;
-    /// let near_field: NearField = toml::from_str("alpha1 = 1.0\nbeta1 = 2\nalpha2 = 0.002\nbeta2 = 3")?;
-    /// assert_eq!(near_field.equilibrium(), Some(0.002));
-    /// # Ok::<(), toml::de::Error>(())
-    /// ```
-    #[must_use]
-    pub fn equilibrium(&self) -> Option<f64> {
-        let acts = self.alpha1 > 0.0 && self.alpha2 > 0.0 && self.beta1 != self.beta2;
-        acts.then(|| (self.alpha2 / self.alpha1).powf(1.0 / (self.beta2 - self.beta1)))
-    }
 }
 
 /// Time between two evaluations of the forces.
@@ -181,16 +158,5 @@ mod tests {
         let cut = NearField { cutoff: Some(0.5), ..bare };
         assert_eq!(cut.switch_from(), Some(0.4));
         assert_eq!(NearField { switch: Some(0.1), ..cut }.switch_from(), Some(0.1));
-    }
-
-    #[test]
-    fn attraction_and_repulsion_balance_where_the_equilibrium_says() {
-        let near_field = scene(&[]).near_field.expect("there is one");
-        let distance = near_field.equilibrium().expect("there is one");
-        assert!((distance - 0.002_f64.powi(2)).abs() < 1e-15);
-        assert!(near_field.attraction(distance).abs() < 1e-14 / distance.powi(2));
-        assert!(near_field.attraction(2.0 * distance) > 0.0 && near_field.attraction(0.5 * distance) < 0.0);
-        assert_eq!(NearField { alpha1: 0.0, ..near_field }.equilibrium(), None);
-        assert_eq!(NearField { beta1: 2.5, ..near_field }.equilibrium(), None);
     }
 }
