@@ -22,6 +22,8 @@ pub struct NewGrain {
     pub radius: f64,
     /// Density, kg/m³.
     pub density: f64,
+    /// Factor in near-field forces; the force between two grains is scaled by the product of theirs.
+    pub strength: f64,
 }
 
 impl NewGrain {
@@ -43,6 +45,8 @@ pub struct Grain {
     pub spin: Vector3<f64>,
     /// How many times this grain has hit the surface.
     pub hits: u32,
+    /// Factor in near-field forces; the force between two grains is scaled by the product of theirs.
+    pub strength: f64,
 }
 
 /// Kinetic energy of one grain (J): translation and rotation, I = 2/5 m r².

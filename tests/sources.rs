@@ -340,6 +340,34 @@ fn tables_are_read_in_any_order_of_columns() {
 }
 
 #[test]
+fn strengths_come_with_the_grains_and_are_1_where_nothing_is_said() {
+    const NEAR_FIELD: &str = "[near_field]\nalpha1 = 1.0\nbeta1 = 2\nalpha2 = 0.0\nbeta2 = 3\n";
+    let folder = tempfile::tempdir().unwrap();
+    let head = "x,y,z,vx,vy,vz";
+    std::fs::write(folder.path().join("plain.csv"), format!("{head}\n1,0,0,0,0,0\n")).unwrap();
+    std::fs::write(folder.path().join("own.csv"), format!("{head},strength\n2,0,0,0,0,0,-2\n3,0,0,0,0,0,0\n")).unwrap();
+    let table = |name: &str| format!("[[source]]\nkind = \"file\"\npath = \"{name}.csv\"\nstrength = 7.0\n");
+    let sources = [
+        NEAR_FIELD.to_owned(),
+        block(1, [-1.0; 3], [-1.0; 3], "strength = 0.5"),
+        lattice([1, 1, 1], [0.5; 3], ""),
+        table("plain"),
+        table("own"),
+    ];
+    let placed = place(&scene(ROOM, &sources.concat()), folder.path(), &|_, _| None).unwrap_or_else(|e| panic!("{e}"));
+    let strengths: Vec<f64> = placed.grains.iter().map(|grain| grain.strength).collect();
+    assert_eq!(strengths, [0.5, 1.0, 7.0, -2.0, 0.0]);
+
+    let nozzle = "[[source]]\nkind = \"nozzle\"\nshape.circle.diameter = 1.0\ncentre = [0, 0, 0]\naxis = [0, 0, -1]\nspeed = 1\n\
+        flow.number_flux = 10\nstrength = 3.0\n";
+    let mut placed = place(&scene(ROOM, &format!("{NEAR_FIELD}{nozzle}")), folder.path(), &|_, _| None)
+        .unwrap_or_else(|e| panic!("{e}"));
+    let nozzle = &mut placed.nozzles[0];
+    let due = nozzle.due().expect("it never stops");
+    assert_eq!(nozzle.enter(due, &mut |_, _| true).expect("the place is free").strength, 3.0);
+}
+
+#[test]
 fn numbers_of_a_table_round_trip() {
     let x = [0.1 + 0.2, 1.0 / 3.0, -1e-300];
     let grains = from_table(ROOM, &format!("x,y,z,vx,vy,vz\n{},{},{},0,0,0\n", x[0], x[1], x[2])).unwrap();

@@ -270,7 +270,14 @@ fn scatter(
         let free = |g: &NewGrain| domain.nearest(g.position - position).norm() > 1.001 * (g.radius + radius);
         if grains.iter().all(free) {
             let spin = if domain.planar { Vector3::new(0.0, any(random).y, 0.0) } else { any(random) } / radius;
-            grains.push(NewGrain { position, velocity: flat(any(random)) * speed, spin, radius, density: 1.0 });
+            grains.push(NewGrain {
+                position,
+                velocity: flat(any(random)) * speed,
+                spin,
+                radius,
+                density: 1.0,
+                strength: 1.0,
+            });
         }
     }
     grains

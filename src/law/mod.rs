@@ -3,7 +3,10 @@
 mod impulse;
 pub(crate) mod near_field;
 
-pub use impulse::{Body, Impulse, PairImpulse, SurfaceImpulse, resolve_pair, resolve_surface};
+pub use impulse::{
+    Body, External, Impulse, PairImpulse, SurfaceImpulse, resolve_pair, resolve_pair_under, resolve_surface,
+    resolve_surface_under,
+};
 pub use near_field::{InvalidTerm, NearField, Term};
 
 use crate::scene;

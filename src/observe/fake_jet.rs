@@ -98,7 +98,13 @@ impl<O: Observer> State<'_, O> {
         let position =
             Vector3::new(dice.random_range(-0.1..0.1), dice.random_range(-0.1..0.1), dice.random_range(low..high));
         let flight = Flight { position, time: 0.0, velocity: Vector3::new(0.0, 0.0, -80.0), radius: RADIUS };
-        let grain = Grain { id, mass: 8500.0 * crate::grains::sphere_volume(RADIUS), spin: Vector3::zeros(), hits: 0 };
+        let grain = Grain {
+            id,
+            mass: 8500.0 * crate::grains::sphere_volume(RADIUS),
+            spin: Vector3::zeros(),
+            hits: 0,
+            strength: 1.0,
+        };
         self.observer.passage(Passage::Entered, self.time, &flight, &grain);
         self.flights.push(flight);
         self.grains.push(grain);

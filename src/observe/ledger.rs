@@ -356,7 +356,7 @@ mod tests {
     fn closes_where_a_moving_surface_brings_all_the_energy() {
         let flight =
             |speed| [Flight { position: Vector3::zeros(), time: 0.0, velocity: Vector3::z() * speed, radius: 0.1 }];
-        let grains = [Grain { id: 0, mass: 2.0, spin: Vector3::zeros(), hits: 0 }];
+        let grains = [Grain { id: 0, mass: 2.0, spin: Vector3::zeros(), hits: 0, strength: 1.0 }];
         let mut ledger = Ledger::default();
         ledger.sample(&Snapshot { time: 0.0, flights: &flight(0.0), grains: &grains });
         // A surface at 1 m/s, restitution 1/2: it leaves the grain at 1.5 m/s.
@@ -370,7 +370,7 @@ mod tests {
     fn a_loss_that_nobody_accounts_for_is_the_residual() {
         let flight =
             |speed| [Flight { position: Vector3::zeros(), time: 0.0, velocity: Vector3::x() * speed, radius: 0.1 }];
-        let grains = [Grain { id: 0, mass: 2.0, spin: Vector3::zeros(), hits: 0 }];
+        let grains = [Grain { id: 0, mass: 2.0, spin: Vector3::zeros(), hits: 0, strength: 1.0 }];
         let mut ledger = Ledger::default();
         ledger.sample(&Snapshot { time: 0.0, flights: &flight(2.0), grains: &grains });
         ledger.sample(&Snapshot { time: 1.0, flights: &flight(1.0), grains: &grains });
@@ -381,7 +381,7 @@ mod tests {
     /// One grain of 2 kg, moving along z, as a sample shows it.
     fn sample(ledger: &mut Ledger, time: f64, speed: f64) {
         let flights = [Flight { position: Vector3::zeros(), time: 0.0, velocity: Vector3::z() * speed, radius: 0.1 }];
-        let grains = [Grain { id: 0, mass: 2.0, spin: Vector3::zeros(), hits: 0 }];
+        let grains = [Grain { id: 0, mass: 2.0, spin: Vector3::zeros(), hits: 0, strength: 1.0 }];
         ledger.sample(&Snapshot { time, flights: &flights, grains: &grains });
     }
 
@@ -444,7 +444,7 @@ mod tests {
         ledger.kick(&Kick { potential_energy: Some(0.0), ..Kick::default() });
         ledger.kick(&Kick { potential_energy: Some(9.0), work_near_field: 3.0, ..Kick::default() });
         let flight = Flight { position: Vector3::zeros(), time: 0.0, velocity: Vector3::z() * 2.0, radius: 0.1 };
-        let grain = Grain { id: 0, mass: 2.0, spin: Vector3::zeros(), hits: 0 };
+        let grain = Grain { id: 0, mass: 2.0, spin: Vector3::zeros(), hits: 0, strength: 1.0 };
         ledger.passage(Passage::Left, 1.0, &flight, &grain);
         ledger.sample(&Snapshot { time: 1.0, flights: &[], grains: &[] });
         assert_eq!((ledger.given_by_near_field(), ledger.energy_residual()), (3.0, 0.0));

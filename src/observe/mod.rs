@@ -8,7 +8,7 @@
 //! use nalgebra::Vector3;
 //!
 //! let flights = [Flight { position: Vector3::zeros(), time: 0.0, velocity: Vector3::new(0.0, 0.0, -2.0), radius: 0.1 }];
-//! let grains = [Grain { id: 0, mass: 3.0, spin: Vector3::zeros(), hits: 0 }];
+//! let grains = [Grain { id: 0, mass: 3.0, spin: Vector3::zeros(), hits: 0, strength: 1.0 }];
 //! let mut ledger = Ledger::default();
 //! ledger.sample(&Snapshot { time: 0.0, flights: &flights, grains: &grains });
 //! assert_eq!(ledger.initial().energy(), 6.0);

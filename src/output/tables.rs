@@ -10,11 +10,7 @@ use crate::observe::{History, SurfaceEnergy};
 use crate::scheme::{GrainCollision, Observer, SurfaceHit};
 
 /// Writes a header and rows.
-fn table<const N: usize, R: Serialize>(
-    out: &mut dyn Write,
-    header: [&str; N],
-    rows: impl Iterator<Item = R>,
-) -> io::Result<()> {
+fn table<R: Serialize>(out: &mut dyn Write, header: &[&str], rows: impl Iterator<Item = R>) -> io::Result<()> {
     let mut table = csv::WriterBuilder::new().has_headers(false).from_writer(out);
     table.write_record(header).map_err(cause)?;
     for row in rows {
@@ -31,15 +27,20 @@ fn cause(error: csv::Error) -> io::Error {
     }
 }
 
-/// `grains.csv`: all grains of a snapshot.
+/// `grains.csv`: all grains of a snapshot. Strengths in near-field forces have a column where not all are 1, so that the table can be the source
+/// of another run.
 pub(super) fn write_grains(out: &mut dyn Write, snapshot: &Snapshot<'_>) -> io::Result<()> {
-    let header = ["id", "x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz", "radius", "density"];
+    const HEADER: [&str; 12] = ["id", "x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz", "radius", "density"];
     let rows = snapshot.flights.iter().zip(snapshot.grains).map(|(flight, grain)| {
         let density = grain.mass / sphere_volume(flight.radius);
         let vectors = [flight.position, flight.velocity, grain.spin].map(|vector| [vector.x, vector.y, vector.z]);
         (grain.id, vectors, flight.radius, density)
     });
-    table(out, header, rows)
+    if snapshot.grains.iter().all(|grain| grain.strength == 1.0) {
+        return table(out, &HEADER, rows);
+    }
+    let strengths = snapshot.grains.iter().map(|grain| grain.strength);
+    table(out, &[&HEADER[..], &["strength"]].concat(), rows.zip(strengths))
 }
 
 /// `series.csv`: the time history.
@@ -62,7 +63,7 @@ pub(super) fn write_series(out: &mut dyn Write, history: &History) -> io::Result
         let counts = [moment.grain_grain, moment.grain_surface, moment.inside];
         (moment.time, moment.kinetic_energy, surface, dissipated, counts)
     });
-    table(out, header, rows)
+    table(out, &header, rows)
 }
 
 /// `surface_hits.csv`: energy to the surface by hit order.
@@ -71,7 +72,7 @@ pub(super) fn write_surface_hits(out: &mut dyn Write, energy: &SurfaceEnergy) ->
         let parts = [tally.normal.value(), tally.tangential.value(), tally.spin.value()];
         (index + 1, tally.hits, tally.energy(), parts)
     });
-    table(out, ["order", "hits", "energy", "normal", "tangential", "spin"], rows)
+    table(out, &["order", "hits", "energy", "normal", "tangential", "spin"], rows)
 }
 
 /// `events.csv`: every collision, written as it happens.
@@ -156,7 +157,7 @@ mod tests {
         let [x, y, z, u, v, w] = AWKWARD;
         let flight =
             Flight { position: Vector3::new(x, y, z), time: 0.0, velocity: Vector3::new(u, v, w), radius: 0.01 };
-        let grain = Grain { id: 12, mass: 0.035, spin: Vector3::new(w, v, u), hits: 1 };
+        let grain = Grain { id: 12, mass: 0.035, spin: Vector3::new(w, v, u), hits: 1, strength: 1.0 };
         let mut bytes = Vec::new();
         write_grains(&mut bytes, &Snapshot { time: 1.0, flights: &[flight], grains: &[grain] }).unwrap();
         let (header, rows) = read(&bytes);
@@ -166,6 +167,14 @@ mod tests {
         let density = 0.035 / sphere_volume(0.01);
         let expected: Vec<u64> = [x, y, z, u, v, w, w, v, u, 0.01, density].map(f64::to_bits).to_vec();
         assert_eq!(bits, expected);
+
+        let weak = [grain, Grain { strength: x, ..grain }];
+        bytes.clear();
+        write_grains(&mut bytes, &Snapshot { time: 1.0, flights: &[flight; 2], grains: &weak }).unwrap();
+        let (header, rows) = read(&bytes);
+        assert_eq!(header.last().map(String::as_str), Some("strength"));
+        let strengths: Vec<f64> = rows.iter().map(|row| row[12].parse().unwrap()).collect();
+        assert_eq!(strengths, [1.0, x]);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use toml::Value;
 
 use super::{
     Arrangement, Boundary, Contact, Distribution, Domain, Friction, Interference, Invalid, Radius, Scene, Source,
-    Surface, Vec3,
+    Surface, Vec3, forces,
 };
 
 /// Most grains that blocks and lattices of one scene may ask for. At the 600 bytes that a grain costs they fill 60 GB; more is
@@ -19,6 +19,9 @@ const ROWS_MAX: u32 = 10_000_000;
 pub(crate) const LARGEST: f64 = 1e30;
 pub(crate) const SMALLEST: f64 = 1e-30;
 
+/// The times of the scene, which may be of any magnitude.
+const TIMES: [&str; 2] = ["run.until", "run.start"];
+
 /// Smallest radius of a grain in units in the last place (2^-52) of the largest coordinate of its domain.
 ///
 /// A position is known to half such a unit, and an overlap gathers the rounding of a few positions, four units at most; a run stops
@@ -26,7 +29,7 @@ pub(crate) const SMALLEST: f64 = 1e-30;
 /// once.) Consequence: a domain reaches out to 1.1 million radii from the origin, and not further.
 const UNITS_IN_RADIUS: f64 = 4e9;
 
-type Checked = Result<(), Invalid>;
+pub(super) type Checked = Result<(), Invalid>;
 
 /// Validates all of a scene that belongs to no single source or surface.
 ///
@@ -41,6 +44,7 @@ pub fn check(scene: &Scene) -> Checked {
     contacts(scene)?;
     sources(scene)?;
     resolved(scene)?;
+    forces::check(scene)?;
     if scene.domain.planar { planar(scene) } else { Ok(()) }
 }
 
@@ -88,7 +92,7 @@ fn all_finite(value: &Value, path: &str) -> Checked {
             format!("{number} is no finite number"),
             "give a finite number, or leave the key out",
         )),
-        Value::Float(number) if number.abs() > LARGEST && !path.starts_with("run.") => Err(Invalid::new(
+        Value::Float(number) if number.abs() > LARGEST && !TIMES.contains(&path) => Err(Invalid::new(
             path,
             format!("{number:e} is too large to compute with"),
             format!("give a number of magnitude {LARGEST:e} at most, in SI units"),
@@ -170,6 +174,7 @@ fn check_contact(key: &str, contact: &Contact) -> Checked {
         return Err(Invalid::new(format!("{key}.restitution"), format!("{e} is outside [0, 1]"), remedy));
     }
     let key = format!("{key}.friction");
+    let not_negative = |key: &str, mu: f64| not_negative(key, mu, "friction is 0 (smooth) or more");
     match contact.friction {
         Friction::Coefficient(mu) => not_negative(&key, mu),
         Friction::StaticDynamic(mu) => {
@@ -306,7 +311,7 @@ fn planar(scene: &Scene) -> Checked {
     Ok(())
 }
 
-fn in_plane(key: &str, vector: Vec3) -> Checked {
+pub(super) fn in_plane(key: &str, vector: Vec3) -> Checked {
     if vector[1] == 0.0 {
         return Ok(());
     }
@@ -314,7 +319,7 @@ fn in_plane(key: &str, vector: Vec3) -> Checked {
     Err(Invalid::new(key, what, "the scene is planar: set the second number to 0, or `domain.planar = false`"))
 }
 
-fn positive(key: &str, value: f64, unit: &str) -> Checked {
+pub(super) fn positive(key: &str, value: f64, unit: &str) -> Checked {
     if value <= 0.0 {
         return Err(Invalid::new(key, format!("{value} {unit} is not above 0"), "give a number above 0"));
     }
@@ -325,9 +330,9 @@ fn positive(key: &str, value: f64, unit: &str) -> Checked {
     Ok(())
 }
 
-fn not_negative(key: &str, value: f64) -> Checked {
+pub(super) fn not_negative(key: &str, value: f64, remedy: &str) -> Checked {
     if value >= 0.0 {
         return Ok(());
     }
-    Err(Invalid::new(key, format!("{value} is below 0"), "friction is 0 (smooth) or more"))
+    Err(Invalid::new(key, format!("{value} is below 0"), remedy))
 }

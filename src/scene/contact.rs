@@ -14,6 +14,9 @@ pub struct Contacts {
     /// What happens to grains that collide again and again in no time.
     #[serde(default)]
     pub collapse: Collapse,
+    /// How long a contact takes, s, where forces act: a force on two grains that touch acts for so long during their contact, and adds to its
+    /// impulse (Arbelaez et al. 2009, eq. 10, 20, 26 and 32). Left out, contact is instantaneous.
+    pub time: Option<f64>,
 }
 
 /// What happens to grains that collide again and again in no time, as hard grains of low restitution do.

@@ -86,7 +86,7 @@ impl SceneFile {
         let overrides = apply(&mut table, path, overrides)?;
         let place = Place { path, text, overrides: &overrides };
 
-        later::refuse(&mut table).map_err(|invalid| place.of(invalid, Caret::Value))?;
+        later::refuse(&table).map_err(|invalid| place.of(invalid, Caret::Value))?;
         shape::check(&table).map_err(|(invalid, caret)| place.of(invalid, caret))?;
         let scene: Scene = table.try_into().map_err(|error| syntax(path, text, &error))?;
         check::check(&scene).map_err(|invalid| place.of(invalid, Caret::Value))?;

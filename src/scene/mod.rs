@@ -6,9 +6,11 @@
 mod check;
 mod contact;
 mod error;
+mod forces;
 mod key;
 mod later;
 mod load;
+mod near_field;
 mod shape;
 
 use schemars::JsonSchema;
@@ -19,6 +21,7 @@ pub use check::{check, check_radius};
 pub use contact::{Collapse, Contact, Contacts, Friction, Regularised, StaticDynamic};
 pub use error::{Invalid, SceneError};
 pub use load::{Overrides, SceneFile};
+pub use near_field::{Auto, NearField, Substep, Summation};
 pub use shape::schema;
 
 /// A vector as it stands in the file: `[x, y, z]`.
@@ -43,6 +46,8 @@ pub struct Scene {
     /// What happens at a contact.
     #[serde(default)]
     pub contact: Contacts,
+    /// The force between grains; left out, there is none and no sub-step for it.
+    pub near_field: Option<NearField>,
     /// Where grains come from.
     #[serde(default)]
     pub source: Vec<Source>,
@@ -76,6 +81,12 @@ pub struct Run {
     /// Which collisions take part.
     #[serde(default)]
     pub interference: Interference,
+    /// Acceleration of every grain, m/s²; left out, there is none and no sub-step for it.
+    #[serde(default)]
+    pub gravity: Vec3,
+    /// Sub-step of a scene in which forces act, s; left out, as long as the local error allows. Where there is a `[near_field]`, give
+    /// `near_field.substep` instead.
+    pub substep: Option<f64>,
 }
 
 /// How time is advanced.
@@ -202,7 +213,31 @@ pub enum Source {
     Nozzle(NozzleSource),
 }
 
-/// Grains from a CSV table with a header: x,y,z,vx,vy,vz and, optionally, wx,wy,wz,radius,density.
+impl Source {
+    /// Radius of its grains, if it has one of its own.
+    #[must_use]
+    pub fn radius(&self) -> Option<&Radius> {
+        match self {
+            Self::File(source) => source.radius.as_ref(),
+            Self::Block(source) => source.radius.as_ref(),
+            Self::Lattice(source) => source.radius.as_ref(),
+            Self::Nozzle(source) => source.radius.as_ref(),
+        }
+    }
+
+    /// Factor of its grains in near-field forces, if it gives one.
+    #[must_use]
+    pub fn strength(&self) -> Option<f64> {
+        match self {
+            Self::File(source) => source.strength,
+            Self::Block(source) => source.strength,
+            Self::Lattice(source) => source.strength,
+            Self::Nozzle(source) => source.strength,
+        }
+    }
+}
+
+/// Grains from a CSV table with a header: x,y,z,vx,vy,vz and, optionally, wx,wy,wz,radius,density,strength.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct FileSource {
@@ -212,6 +247,9 @@ pub struct FileSource {
     pub radius: Option<Radius>,
     /// Density (kg/m³) where the table has none; that of `[grain]` where left out.
     pub density: Option<f64>,
+    /// Factor of these grains in near-field forces, where the table has none: that between two grains is scaled by the product of theirs. Any
+    /// number; 1 where left out.
+    pub strength: Option<f64>,
 }
 
 /// Grains at random places in a box: random sequential addition (Widom 1966).
@@ -239,6 +277,8 @@ pub struct BlockSource {
     pub radius: Option<Radius>,
     /// Density (kg/m³); that of `[grain]` where left out.
     pub density: Option<f64>,
+    /// Factor of these grains in near-field forces: that between two grains is scaled by the product of theirs. Any number; 1 where left out.
+    pub strength: Option<f64>,
 }
 
 /// What lies inside the box of a block.
@@ -277,6 +317,8 @@ pub struct LatticeSource {
     pub radius: Option<Radius>,
     /// Density (kg/m³); that of `[grain]` where left out.
     pub density: Option<f64>,
+    /// Factor of these grains in near-field forces: that between two grains is scaled by the product of theirs. Any number; 1 where left out.
+    pub strength: Option<f64>,
 }
 
 /// Places of the grains in a unit cell.
@@ -320,6 +362,8 @@ pub struct NozzleSource {
     pub radius: Option<Radius>,
     /// Density (kg/m³); that of `[grain]` where left out.
     pub density: Option<f64>,
+    /// Factor of these grains in near-field forces: that between two grains is scaled by the product of theirs. Any number; 1 where left out.
+    pub strength: Option<f64>,
 }
 
 /// Outline of a nozzle; centres of grains come through it.

@@ -39,7 +39,7 @@ impl<'a> Walk<'a> {
     fn value(&self, schema: &'a Schema, value: &Value, path: &str) -> Checked {
         let forms = self.forms(schema);
         let names: Vec<&str> = forms.iter().filter_map(|form| form["const"].as_str()).collect();
-        if !names.is_empty() {
+        if names.len() == forms.len() {
             return one_of(&names, value, path);
         }
         let fitting: Vec<&Schema> = forms.iter().copied().filter(|form| accepts(form, value)).collect();
@@ -126,10 +126,11 @@ impl<'a> Walk<'a> {
     fn expected(&self, schema: &'a Schema) -> String {
         let forms = self.forms(schema);
         let names: Vec<&str> = forms.iter().filter_map(|form| form["const"].as_str()).collect();
-        if !names.is_empty() {
+        if names.len() == forms.len() {
             return format!("one of {}", quoted(&names));
         }
         let one = |form: &&'a Schema| match kind_of(form) {
+            "string" if form["const"].is_string() => format!("{}", form["const"]),
             "number" => "a number".to_owned(),
             "integer" => "a whole number".to_owned(),
             "string" => "a text in quotes".to_owned(),
@@ -191,7 +192,7 @@ fn accepts(form: &Schema, value: &Value) -> bool {
     match value {
         Value::Float(_) => kind_of(form) == "number",
         Value::Integer(_) => matches!(kind_of(form), "number" | "integer"),
-        Value::String(_) => kind_of(form) == "string",
+        Value::String(text) => kind_of(form) == "string" && form["const"].as_str().is_none_or(|word| word == text),
         Value::Boolean(_) => kind_of(form) == "boolean",
         Value::Array(_) => kind_of(form) == "array",
         Value::Table(_) => kind_of(form) == "object",

@@ -762,5 +762,5 @@ fn flight(grain: &NewGrain) -> Flight {
 }
 
 fn carried(grain: &NewGrain, id: u64) -> Grain {
-    Grain { id, mass: grain.mass(), spin: grain.spin, hits: 0 }
+    Grain { id, mass: grain.mass(), spin: grain.spin, hits: 0, strength: grain.strength }
 }

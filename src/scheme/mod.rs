@@ -167,9 +167,9 @@ impl SurfaceHit {
 
 /// What forces did to all grains together since the last kick, as observers see it: one a sub-step, none where no force acts.
 ///
-/// Works and impulses are those that the scheme applied, in kicks, in their synchronisation at a collision and in contacts of finite
-/// duration alike, so that kinetic energy and momentum are accounted for to round-off. The potential energy is that of the grains at their
-/// places now: against it the ledger sees what the sub-stepping itself gains or loses.
+/// Impulses are those that the scheme applied, in kicks, in their synchronisation at a collision and in contacts of finite duration alike, so that
+/// momentum is accounted for to round-off. The potential energy is that of the grains at their places now: against it the ledger sees what
+/// the sub-stepping itself gains or loses.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Kick {
     /// Simulated time, s.

@@ -68,6 +68,11 @@ impl Context<'_> {
         Ok(spin)
     }
 
+    /// Factor of the source in near-field forces; 1 where it gives none.
+    pub(super) fn strength(&self) -> Result<f64, Invalid> {
+        value::finite(&self.key("strength"), self.scene.source[self.number].strength().unwrap_or(1.0))
+    }
+
     /// Velocity, thermal speed and spin of a block or lattice.
     pub(super) fn motion(&self, velocity: Vec3, thermal_speed: f64, spin: Vec3) -> Result<Motion, Invalid> {
         let key = self.key("velocity");
@@ -76,7 +81,8 @@ impl Context<'_> {
             value::zero_in_plane(&key, &velocity, &[1])?;
         }
         let thermal_speed = value::not_negative(&self.key("thermal_speed"), thermal_speed)?;
-        Ok(Motion { velocity, thermal_speed, spin: self.spin(spin)?, planar: self.planar() })
+        let (spin, strength) = (self.spin(spin)?, self.strength()?);
+        Ok(Motion { velocity, thermal_speed, spin, strength, planar: self.planar() })
     }
 
     /// The box of a block or lattice: finite, not inverted, inside the domain; flat, at y = 0, in a planar scene.
@@ -151,12 +157,13 @@ pub(super) struct Bounds {
     pub(super) upper: Vector3<f64>,
 }
 
-/// How the grains of a block or lattice move.
+/// How the grains of a block or lattice move, and what they carry.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Motion {
     velocity: Vector3<f64>,
     thermal_speed: f64,
     spin: Vector3<f64>,
+    strength: f64,
     planar: bool,
 }
 
@@ -170,6 +177,6 @@ impl Motion {
                 velocity[axis] += self.thermal_speed * rng.sample::<f64, _>(StandardNormal);
             }
         }
-        NewGrain { position, velocity, spin: self.spin, radius, density }
+        NewGrain { position, velocity, spin: self.spin, radius, density, strength: self.strength }
     }
 }

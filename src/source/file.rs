@@ -1,6 +1,6 @@
 //! Grains from a CSV table.
 //!
-//! The header names the columns, in any order: `x,y,z,vx,vy,vz` and, optionally, `wx,wy,wz,radius,density`. A column `id`
+//! The header names the columns, in any order: `x,y,z,vx,vy,vz` and, optionally, `wx,wy,wz,radius,density,strength`. A column `id`
 //! is passed over, so that the `grains.csv` of one run can be the source of another. Lines that start with `#` are
 //! comments.
 
@@ -18,10 +18,14 @@ use crate::grains::NewGrain;
 use crate::scene::{FileSource, Invalid, LARGEST, SMALLEST};
 
 /// All columns; the first `NEEDED` must be there.
-const COLUMNS: [&str; 11] = ["x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz", "radius", "density"];
+const COLUMNS: [&str; 12] = ["x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz", "radius", "density", "strength"];
 const NEEDED: usize = 6;
 const RADIUS: usize = 9;
 const DENSITY: usize = 10;
+const STRENGTH: usize = 11;
+
+/// Columns of what must be above 0.
+const POSITIVE: [usize; 2] = [RADIUS, DENSITY];
 
 /// Columns that must be 0 in a planar scene: y, vy, wx and wz.
 const ZERO_IN_PLANE: [usize; 4] = [1, 4, 6, 8];
@@ -39,7 +43,14 @@ pub(super) fn read(source: &FileSource, folder: &Path, context: &Context<'_>) ->
     let mut reader = ReaderBuilder::new().trim(Trim::All).comment(Some(b'#')).from_reader(file);
     let columns = table.columns(reader.headers().map_err(|error| table.unreadable(&error, None))?)?;
 
-    let mut fallback = Fallback { rng: context.rng(), radii: None, density: None };
+    if columns[STRENGTH].is_some() && context.scene.near_field.is_none() {
+        return Err(table.invalid(
+            "has a column `strength`, but the scene has no near field",
+            "take the column out, or add `[near_field]`",
+        ));
+    }
+
+    let mut fallback = Fallback { rng: context.rng(), radii: None, density: None, strength: context.strength()? };
     if columns[RADIUS].is_none() {
         fallback.radii = Some(context.radii(source.radius.as_ref())?);
     }
@@ -81,6 +92,7 @@ struct Fallback {
     rng: Pcg64Mcg,
     radii: Option<Radii>,
     density: Option<f64>,
+    strength: f64,
 }
 
 /// What messages say about the table.
@@ -141,6 +153,7 @@ impl Table {
             spin: vector(6)?,
             radius: value(RADIUS)?.or(drawn).expect("the radius has a column or a fallback"),
             density: value(DENSITY)?.or(fallback.density).expect("the density has a column or a fallback"),
+            strength: value(STRENGTH)?.unwrap_or(fallback.strength),
         })
     }
 
@@ -153,10 +166,10 @@ impl Table {
             Err(_) => refuse("is not a number", "write a number such as 0.25 or -1.5e-3"),
             Ok(value) if !value.is_finite() => refuse("is not finite", "give a finite number"),
             Ok(value) if value.abs() > LARGEST => refuse("is too large to compute with", "give it in SI units"),
-            Ok(value) if column >= RADIUS && value > 0.0 && value < SMALLEST => {
+            Ok(value) if POSITIVE.contains(&column) && value > 0.0 && value < SMALLEST => {
                 refuse("is too small to compute with", "give it in SI units")
             }
-            Ok(value) if column >= RADIUS && value <= 0.0 => {
+            Ok(value) if POSITIVE.contains(&column) && value <= 0.0 => {
                 refuse("is not larger than 0", "give a number larger than 0")
             }
             Ok(value) if self.planar && ZERO_IN_PLANE.contains(&column) && value != 0.0 => refuse(

@@ -50,6 +50,7 @@ pub struct Nozzle {
     speed: f64,
     spin: Vector3<f64>,
     density: f64,
+    strength: f64,
     radii: Radii,
     flux: f64,
     start: f64,
@@ -107,6 +108,7 @@ impl Nozzle {
             speed,
             spin: context.spin(source.spin)?,
             density: context.density(source.density)?,
+            strength: context.strength()?,
             radii,
             flux,
             start: start.max(scene.run.start),
@@ -168,7 +170,8 @@ impl Nozzle {
                     self.defer(time); // it waited behind this one
                 }
                 let velocity = self.speed * direction;
-                return Some(NewGrain { position, velocity, spin: self.spin, radius, density: self.density });
+                let Self { spin, density, strength, .. } = *self;
+                return Some(NewGrain { position, velocity, spin, radius, density, strength });
             }
         }
         self.defer((time + RETRY_FLIGHT * 2.0 * radius / self.speed).max(time.next_up()));

@@ -71,7 +71,14 @@ pub fn smooth(grain: f64, surface: f64) -> Laws {
 
 /// A grain without spin, of mass `mass` (kg).
 pub fn grain(position: Vector3<f64>, velocity: Vector3<f64>, radius: f64, mass: f64) -> NewGrain {
-    NewGrain { position, velocity, spin: Vector3::zeros(), radius, density: mass / (4.0 / 3.0 * PI * radius.powi(3)) }
+    NewGrain {
+        position,
+        velocity,
+        spin: Vector3::zeros(),
+        radius,
+        density: mass / (4.0 / 3.0 * PI * radius.powi(3)),
+        strength: 1.0,
+    }
 }
 
 /// Runs to `until` (s).
