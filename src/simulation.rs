@@ -8,9 +8,16 @@ use nalgebra::Vector3;
 
 use crate::law::{ContactLaw, Friction};
 use crate::scene::{Boundary, Interference, Invalid, Scene};
-use crate::scheme::{Broken, EventDriven, Laws, Moments, Observer, Progress};
+use crate::grains::NewGrain;
+use crate::law::{NearField, Term};
+use crate::near_field::{CutOff, ForceSum, Method};
+use crate::scene::{Substep, Summation};
+use crate::scheme::{Broken, EventDriven, Forces, Laws, Length, Moments, Observer, Progress, Substepped};
 use crate::source::{self, Nozzle};
 use crate::surface::Surface;
+
+/// Skin of the neighbour lists of a near field with a cut-off, over the cut-off.
+const SKIN: f64 = 0.15;
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,7 +52,7 @@ pub struct Outcome {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Simulation {
-    scheme: EventDriven<Surface>,
+    scheme: Advance,
     counts: Vec<usize>,
     nozzles: Vec<Nozzle>,
     samples: Moments,
@@ -73,7 +80,14 @@ impl Simulation {
             let after = nozzle.opens() - scene.run.start;
             nozzle.check_clear(&|centre, radius| overlap(centre, radius, after))?;
         }
-        let scheme = EventDriven::new(&placed.grains, surface, domain(scene), laws(scene)?, scene.run.start);
+        let laws = laws(scene)?;
+        let engine = EventDriven::new(&placed.grains, surface, domain(scene), laws, scene.run.start);
+        let scheme = if scene.has_forces() {
+            let forces = forces(scene, placed.grains.len() as u64)?;
+            Advance::UnderForces(Box::new(Substepped::new(engine, forces, laws, length(scene))))
+        } else {
+            Advance::Freely(Box::new(engine))
+        };
         let moments = |count| Moments::new(scene.run.start, scene.run.until, count);
         Ok(Self {
             scheme,
@@ -97,23 +111,24 @@ impl Simulation {
         loop {
             let (time, stop) = self.next_stop();
             if self.scheme.advance(time, observer, watch)?.is_break() {
-                return Ok(self.break_off(observer));
+                return self.break_off(observer);
             }
             match stop {
                 Stop::Sample => {
-                    self.scheme.snapshot(time, |snapshot| observer.sample(snapshot));
+                    self.scheme.sample(time, observer)?;
                     self.samples.advance();
                 }
                 Stop::Frame(number) => {
-                    self.scheme.snapshot(time, |snapshot| observer.frame(number, snapshot));
+                    self.scheme.engine().snapshot(time, |snapshot| observer.frame(number, snapshot));
                     self.frames.advance();
                 }
                 Stop::Entry(nozzle) => {
                     let Self { scheme, nozzles, .. } = self;
                     let entering = nozzles[nozzle].enter(time, &mut |place, radius| {
-                        let inside = scheme.surface().overlaps(place, radius, time - scheme.epoch_start());
+                        let engine = scheme.engine();
+                        let inside = engine.surface().overlaps(place, radius, time - engine.epoch_start());
                         inside.is_none_or(|(_, depth)| source::just_touches(depth, radius))
-                            && scheme.is_free(place, radius, time)
+                            && engine.is_free(place, radius, time)
                     });
                     if let Some(grain) = entering {
                         scheme.enter(time, &grain, observer);
@@ -139,7 +154,7 @@ impl Simulation {
     /// The surface.
     #[must_use]
     pub fn surface(&self) -> &Surface {
-        self.scheme.surface()
+        self.scheme.engine().surface()
     }
 
     /// Whatever comes first; at equal times in the order in which they stand here, so that a sample at the end sees the end.
@@ -155,10 +170,56 @@ impl Simulation {
     }
 
     /// Shows observers the moment at which a run was broken off as its last sample.
-    fn break_off(&mut self, observer: &mut impl Observer) -> Outcome {
-        let time = self.scheme.time();
-        self.scheme.snapshot(time, |snapshot| observer.sample(snapshot));
-        Outcome { time, interrupted: true }
+    fn break_off(&mut self, observer: &mut impl Observer) -> Result<Outcome, Broken> {
+        let time = self.scheme.engine().time();
+        self.scheme.sample(time, observer)?;
+        Ok(Outcome { time, interrupted: true })
+    }
+}
+
+/// How time is advanced.
+#[derive(Clone, Debug)]
+enum Advance {
+    /// Nothing acts between events.
+    Freely(Box<EventDriven<Surface>>),
+    /// In sub-steps.
+    UnderForces(Box<Substepped<Surface>>),
+}
+
+impl Advance {
+    fn advance(
+        &mut self,
+        end: f64,
+        observer: &mut impl Observer,
+        watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<ControlFlow<()>, Broken> {
+        match self {
+            Self::Freely(engine) => engine.advance(end, observer, watch),
+            Self::UnderForces(scheme) => scheme.advance(end, observer, watch),
+        }
+    }
+
+    /// Tells the observer what forces did and shows it all grains.
+    fn sample(&mut self, time: f64, observer: &mut impl Observer) -> Result<(), Broken> {
+        if let Self::UnderForces(scheme) = self {
+            scheme.tell(time, observer)?;
+        }
+        self.engine().snapshot(time, |snapshot| observer.sample(snapshot));
+        Ok(())
+    }
+
+    fn enter(&mut self, time: f64, grain: &NewGrain, observer: &mut impl Observer) {
+        match self {
+            Self::Freely(engine) => engine.enter(time, grain, observer),
+            Self::UnderForces(scheme) => scheme.enter(time, grain, observer),
+        }
+    }
+
+    fn engine(&self) -> &EventDriven<Surface> {
+        match self {
+            Self::Freely(engine) => engine,
+            Self::UnderForces(scheme) => scheme.engine(),
+        }
     }
 }
 
@@ -192,6 +253,34 @@ fn laws(scene: &Scene) -> Result<Laws, Invalid> {
     };
     let (interference, collapse) = (scene.run.interference, scene.contact.collapse);
     Ok(Laws { grain, surface, interference, collapse })
+}
+
+/// The forces of a scene that starts with so many grains.
+fn forces(scene: &Scene, grains: u64) -> Result<Forces, Invalid> {
+    let near_field = scene.near_field.as_ref().map(|table| {
+        let refuse = |what: String| Invalid::new("near_field", what, "choose other values");
+        let attraction = Term { alpha: table.alpha1, beta: table.beta1 };
+        let repulsion = Term { alpha: table.alpha2, beta: table.beta2 };
+        let law = NearField::new(attraction, repulsion).map_err(|error| refuse(error.to_string()))?;
+        let method = match (table.summation(grains), table.cutoff, table.switch_from()) {
+            (Summation::CutOff, Some(radius), Some(switch)) => {
+                let skin = SKIN * radius;
+                Method::CutOff(CutOff { radius, switch_width: radius - switch, skin })
+            }
+            _ => Method::Direct,
+        };
+        ForceSum::new(law, method, &domain(scene)).map_err(|error| refuse(error.to_string()))
+    });
+    let contact_time = scene.contact.time.unwrap_or(0.0);
+    Ok(Forces { gravity: Vector3::from(scene.run.gravity), near_field: near_field.transpose()?, contact_time })
+}
+
+/// How long the sub-steps of a scene are.
+fn length(scene: &Scene) -> Length {
+    match scene.substep() {
+        Substep::Fixed(step) => Length::Fixed(step),
+        Substep::Chosen(_) => Length::Within(scene.tolerance()),
+    }
 }
 
 /// The domain as the engine needs it.

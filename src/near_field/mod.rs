@@ -144,6 +144,15 @@ impl ForceSum {
         Err(found.unwrap_or(Singular::NotFinite(0)))
     }
 
+    /// Whether pairs nearer than `distance` (m) feel the law as it is, free of the switch of a cut-off.
+    #[must_use]
+    pub fn is_plain_within(&self, distance: f64) -> bool {
+        match self.method {
+            Method::CutOff(CutOff { radius, switch_width, .. }) => distance <= radius - switch_width,
+            _ => true,
+        }
+    }
+
     /// Force (N) on a grain whose partner is at `apart` (m) from it, both of strength 1: what this sum counts for one pair.
     #[must_use]
     pub fn pair_force(&self, apart: Vector3<f64>) -> Vector3<f64> {

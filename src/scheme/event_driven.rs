@@ -10,7 +10,7 @@ use rustc_hash::FxHashSet;
 use super::{Broken, GrainCollision, Observer, Passage, Progress, SurfaceHit};
 use crate::grains::{Grain, NewGrain, Snapshot};
 use crate::near_field::Singular;
-use crate::law::{NearField, Body, ContactLaw, Friction, resolve_pair, resolve_surface};
+use crate::law::{NearField, Body, ContactLaw, Friction, resolve_pair_under, resolve_surface_under, External};
 use crate::scene::{Collapse, Interference};
 use crate::surface::LARGEST_SLOPE;
 
@@ -121,6 +121,19 @@ impl Row {
     }
 }
 
+/// What acts in a sub-step.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Under {
+    /// Grains nearer to each other than this (m) may be in contact at rest.
+    pub(super) reach: f64,
+    /// m/s²; what a grain that enters is accelerated at until the next sub-step.
+    pub(super) gravity: Vector3<f64>,
+    /// The near field, as it acts between two grains that touch.
+    pub(super) near_field: Option<NearField>,
+    /// How long a contact lasts for the impulse that forces give to it, s.
+    pub(super) contact_time: f64,
+}
+
 /// What the treatment of contacts at rest did within sub-steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Held {
@@ -162,14 +175,11 @@ pub struct EventDriven<S: Surface, C: Calendar = Tournament> {
     in_a_row: f64,
     /// Whether forces act: then the epoch is a sub-step, and somebody else says when the next one starts.
     forces: bool,
-    /// Acceleration of a grain that enters, until the next sub-step, m/s².
-    entry_acceleration: Vector3<f64>,
+    under: Under,
     /// Approach speed below which a contact under force has come to rest, m/s.
     resting_speed: f64,
     /// The same for two grains, and for grains among others at the surface.
     resting_speed_of_pairs: f64,
-    /// The near field, as it acts between two grains that touch.
-    near_field: Option<NearField>,
     /// Where the grains were at the last kick, m; empty without a near field.
     anchors: Vec<Vector3<f64>>,
     /// Pairs whose accelerations are those of their contact already.
@@ -210,10 +220,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             outrun: false,
             in_a_row: 0.0,
             forces: false,
-            entry_acceleration: Vector3::zeros(),
+            under: Under::default(),
             resting_speed: 0.0,
             resting_speed_of_pairs: 0.0,
-            near_field: None,
             anchors: Vec::new(),
             synchronised: FxHashSet::default(),
             held: Held::default(),
@@ -259,22 +268,19 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.begin(after, length);
     }
 
-    /// Starts a sub-step at the time that has been reached; grains that enter in it are accelerated at `entering` (m/s²). `kick` is given what
-    /// [`Encounters::start_sub_step`] gives it, and what grains carry; it gives the length of the sub-step (s) and the strongest acceleration.
-    pub fn start_sub_step(
+    /// Starts a sub-step at the time that has been reached. `kick` is given what [`Encounters::start_sub_step`] gives it, and what grains carry; it
+    /// gives the length of the sub-step (s) and the strongest acceleration (m/s²).
+    pub(super) fn start_sub_step(
         &mut self,
-        reach: f64,
-        entering: Vector3<f64>,
-        near_field: Option<NearField>,
+        under: &Under,
         kick: impl FnOnce(&S, &[Touch], &mut [Grain], &mut [Flight], &mut [Vector3<f64>]) -> (f64, f64),
     ) {
-        self.entry_acceleration = entering;
-        self.near_field = near_field;
+        self.under = *under;
         let after = self.time - self.epoch_start;
         self.natural_epoch(after);
         self.forces = true;
         let (grains, mut length, mut strongest) = (&mut self.grains, 0.0, 0.0);
-        self.encounters.start_sub_step(after, reach, |surface, touches, flights, accelerations| {
+        self.encounters.start_sub_step(after, under.reach, |surface, touches, flights, accelerations| {
             (length, strongest) = kick(surface, touches, grains, flights, accelerations);
             length
         });
@@ -283,7 +289,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.resting_speed_of_pairs = if sticks { strongest * length } else { self.resting_speed };
         self.anchors.clear();
         self.synchronised.clear();
-        if near_field.is_some() {
+        if under.near_field.is_some() {
             let slots = 0..self.grains.len() as u32;
             self.anchors.extend(slots.map(|grain| self.encounters.flight(grain).position));
         }
@@ -318,6 +324,12 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     #[must_use]
     pub fn held(&self) -> Held {
         self.held
+    }
+
+    /// Smallest radius of the grains inside, m; infinity where there are none.
+    #[must_use]
+    pub fn smallest_radius(&self) -> f64 {
+        self.encounters.inside().map(|grain| self.encounters.flight(grain).radius).fold(f64::INFINITY, f64::min)
     }
 
     /// Largest radius of the grains inside, m.
@@ -462,20 +474,28 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         if self.forces && (first.velocity - second.velocity).dot(&normal) <= self.resting_speed_of_pairs {
             return self.hold_pair(time, [a, b], [first, second], normal, overlap_over_radius);
         }
-        let mut contact = resolve_pair(&self.laws.grain, &first, &second, normal);
+        let external = self.external([a, b]);
+        let mut contact = resolve_pair_under(&self.laws.grain, &first, &second, normal, &external);
         let mut withheld = 0.0;
         // Both rows go on, whatever the first says.
         let approach = contact.approach_speed;
         if self.is_collapsing(time, a, b, approach) | self.is_collapsing(time, b, a, approach) {
             withheld = contact.impulse.dissipated;
-            contact = resolve_pair(&ELASTIC, &first, &second, normal);
+            contact = resolve_pair_under(&ELASTIC, &first, &second, normal, &external);
         }
         // Where rounding has turned the slightest graze into none, both fly on.
         if contact.impulse.normal == 0.0 {
             self.deflect(&[(a, first.velocity), (b, second.velocity)]);
             return Ok(());
         }
-        let [after_a, after_b] = contact.after;
+        let [mut after_a, mut after_b] = contact.after;
+        if self.under.contact_time > 0.0 {
+            // The forces have had their share in the contact, and do not act for as long after it.
+            after_a.velocity -= external.on_first / after_a.mass;
+            after_b.velocity -= external.on_second / after_b.mass;
+            let change = energy(&first) + energy(&second) - energy(&after_a) - energy(&after_b);
+            self.held.dissipated_grain += change - contact.impulse.dissipated;
+        }
         self.check(time, &ids, overlap_over_radius, &[after_a.velocity, after_b.velocity])?;
         self.grains[a as usize].spin = after_a.spin;
         self.grains[b as usize].spin = after_b.spin;
@@ -511,11 +531,18 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         if self.forces && -(before.velocity - contact.velocity).dot(&contact.normal) <= self.resting_speed_at_surface(grain) {
             return self.hold_on_surface(time, grain, &before, &contact);
         }
-        let mut resolved = resolve_surface(&self.laws.surface, &before, contact.normal, contact.velocity);
+        let external = self.external([grain, grain]).on_first;
+        let mut resolved =
+            resolve_surface_under(&self.laws.surface, &before, contact.normal, contact.velocity, external);
         let mut withheld = 0.0;
         if self.is_collapsing(time, grain, SURFACE, resolved.approach_speed) {
             withheld = resolved.impulse.dissipated;
-            resolved = resolve_surface(&ELASTIC, &before, contact.normal, contact.velocity);
+            resolved = resolve_surface_under(&ELASTIC, &before, contact.normal, contact.velocity, external);
+        }
+        if self.under.contact_time > 0.0 {
+            resolved.after.velocity -= external / before.mass;
+            let change = energy(&before) - energy(&resolved.after) + resolved.work;
+            self.held.dissipated_surface += change - resolved.impulse.dissipated;
         }
         if resolved.impulse.normal == 0.0 {
             self.deflect(&[(grain, before.velocity)]);
@@ -556,17 +583,29 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         Ok(())
     }
 
+    /// What forces give to two grains during a contact of finite duration.
+    #[inline]
+    fn external(&self, grains: [u32; 2]) -> External {
+        if self.under.contact_time == 0.0 {
+            return External::default();
+        }
+        let force = |grain: u32| self.encounters.bend(grain).acceleration * self.grains[grain as usize].mass;
+        External::new(grains.map(force), self.under.contact_time)
+    }
+
     /// Gives two grains that touch the accelerations they have there: the near field between the two at contact, in place of that at the last
     /// kick. The rest of the near field hardly changes within a sub-step.
     #[inline]
     fn synchronise(&mut self, a: u32, b: u32) {
-        let Some(near_field) = self.near_field else { return };
+        let Some(near_field) = self.under.near_field else { return };
         let slots = self.anchors.len() as u32;
         if a < slots && b < slots && self.synchronised.insert([a, b]) {
             let [at_kick_a, at_kick_b] = [a, b].map(|grain| self.anchors[grain as usize]);
             let now = self.true_flight(b).position - self.true_flight(a).position;
-            let force = near_field.force_on(self.domain.nearest(now))
-                - near_field.force_on(self.domain.nearest(at_kick_b - at_kick_a));
+            let strength = self.grains[a as usize].strength * self.grains[b as usize].strength;
+            let force = (near_field.force_on(self.domain.nearest(now))
+                - near_field.force_on(self.domain.nearest(at_kick_b - at_kick_a)))
+                * strength;
             for (grain, force) in [(a, force), (b, -force)] {
                 self.encounters.pull(grain, force / self.grains[grain as usize].mass);
             }
@@ -667,8 +706,8 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             let bend = self.encounters.bend(grain);
             let mass = sign * self.grains[grain as usize].mass;
             let lag = self.encounters.flight(grain).time - 0.5 * bend.step;
-            self.held.impulse_gravity += self.entry_acceleration * (mass * lag);
-            self.held.impulse_near_field += (bend.acceleration - self.entry_acceleration) * (mass * lag);
+            self.held.impulse_gravity += self.under.gravity * (mass * lag);
+            self.held.impulse_near_field += (bend.acceleration - self.under.gravity) * (mass * lag);
         }
     }
 
@@ -677,7 +716,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let flight = Flight { time: time - self.epoch_start, ..flight(new) };
         let grain = carried(new, self.entered);
         self.entered += 1;
-        let slot = self.encounters.insert(flight, self.entry_acceleration) as usize;
+        let slot = self.encounters.insert(flight, self.under.gravity) as usize;
         if slot == self.grains.len() {
             self.grains.push(grain);
             if self.laws.collapse == Collapse::Elastic {
@@ -742,6 +781,11 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         }
         Err(broken(self.epoch_start + time, ids, overlap, allowed, numbers))
     }
+}
+
+/// Kinetic energy, J.
+fn energy(body: &Body) -> f64 {
+    0.5 * body.mass * (body.velocity.norm_squared() + 0.4 * body.radius.powi(2) * body.spin.norm_squared())
 }
 
 /// Length of an epoch that starts at simulated time `start` (s), for grains of this radius (m) and speed (m/s): a power of two.

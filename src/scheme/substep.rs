@@ -12,7 +12,7 @@ use impinge_events::calendar::{Calendar, Tournament};
 use impinge_events::{Domain, Flight, Surface};
 use nalgebra::Vector3;
 
-use super::event_driven::Held;
+use super::event_driven::{Held, Under};
 use super::resting::Resting;
 use super::{Broken, EventDriven, Kick, Laws, Observer, Passage, Progress, Rest};
 use crate::grains::{Grain, NewGrain, kinetic_energy};
@@ -25,7 +25,31 @@ pub struct Forces {
     pub gravity: Vector3<f64>,
     /// Near field between grains.
     pub near_field: Option<ForceSum>,
+    /// How long a contact lasts for the impulse that forces give to it, s; 0 where contacts are instantaneous.
+    pub contact_time: f64,
 }
+
+/// How long sub-steps are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Length {
+    /// Always the same, s.
+    Fixed(f64),
+    /// As long as the local error allows: the largest difference in position of any grain between one whole and two half sub-steps, over its
+    /// radius, is compared with this every [`STEPS_PER_CHECK`] sub-steps.
+    Within(f64),
+}
+
+/// Sub-steps between two comparisons of whole and half sub-steps. To compare costs three sub-steps.
+pub const STEPS_PER_CHECK: u64 = 8;
+/// Of the sub-step that would just meet the tolerance, this part is taken.
+const CAUTIOUS: f64 = 0.8;
+/// By how much sub-steps grow and shrink at once.
+const GROWTH: [f64; 2] = [0.2, 2.0];
+/// Part of the radius by which the path of a grain may depart from its chord within a sub-step, where the sub-step is chosen: the overlap that
+/// grains of unequal acceleration may have.
+const SAG: f64 = 1e-5;
+/// Attempts to find a sub-step that meets the tolerance, before the shortest is taken.
+const ATTEMPTS: u32 = 40;
 
 /// Grains under forces, advanced in sub-steps from event to event.
 #[derive(Clone, Debug)]
@@ -34,8 +58,11 @@ pub struct Substepped<S: Surface, C: Calendar = Tournament> {
     forces: Forces,
     laws: Laws,
     resting: Resting,
+    length: Length,
     /// Length of a sub-step, s.
     step: f64,
+    /// Length of the sub-step that has ended, s.
+    ended: f64,
     /// End of the current sub-step, simulated time, s.
     step_end: f64,
     /// What acted on each grain at the last kick, m/s², without what contacts carry.
@@ -43,6 +70,8 @@ pub struct Substepped<S: Surface, C: Calendar = Tournament> {
     /// How each grain went into the sub-step.
     starts: Vec<Start>,
     domain: Domain,
+    /// Whether any grain has a strength other than 1.
+    strengths: bool,
     /// Total of what forces and contacts at rest did until the last kick.
     books: Books,
     /// The same as last told to observers.
@@ -146,14 +175,21 @@ impl Books {
 
 impl Forces {
     /// Writes what acts on each grain (m/s²) to `pull`.
-    fn pull(&mut self, grains: &[Grain], flights: &[Flight], pull: &mut Vec<Vector3<f64>>) -> Result<(), Singular> {
+    fn pull(
+        &mut self,
+        grains: &[Grain],
+        flights: &[Flight],
+        strengths: bool,
+        pull: &mut Vec<Vector3<f64>>,
+    ) -> Result<(), Singular> {
         pull.clear();
         pull.resize(flights.len(), self.gravity);
         let Some(near_field) = &mut self.near_field else { return Ok(()) };
         let inside: Vec<usize> = (0..flights.len()).filter(|&slot| flights[slot].radius > 0.0).collect();
         let positions: Vec<_> = inside.iter().map(|&slot| flights[slot].position).collect();
         let mut forces = vec![Vector3::zeros(); positions.len()];
-        near_field.forces(&positions, None, &mut forces)?;
+        let strengths = strengths.then(|| inside.iter().map(|&slot| grains[slot].strength).collect::<Vec<_>>());
+        near_field.forces(&positions, strengths.as_deref(), &mut forces)?;
         for (&slot, force) in inside.iter().zip(&forces) {
             pull[slot] += force / grains[slot].mass;
         }
@@ -161,26 +197,35 @@ impl Forces {
     }
 }
 
-impl<S: Surface, C: Calendar> Substepped<S, C> {
-    /// Grains under `forces` in sub-steps of `step` (s).
+impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
+    /// Grains under `forces` in sub-steps of the given length.
     #[must_use]
-    pub fn new(engine: EventDriven<S, C>, forces: Forces, laws: Laws, step: f64) -> Self {
+    pub fn new(engine: EventDriven<S, C>, forces: Forces, laws: Laws, length: Length) -> Self {
         let step_end = engine.time();
-        Self {
+        let strengths = engine.snapshot(step_end, |snapshot| snapshot.grains.iter().any(|grain| grain.strength != 1.0));
+        let mut scheme = Self {
+            domain: engine.domain(),
+            engine,
             forces,
             laws,
             resting: Resting::default(),
-            step: rounded(step),
+            length,
+            step: 0.0,
+            ended: 0.0,
             step_end,
             pull: Vec::new(),
             starts: Vec::new(),
-            domain: engine.domain(),
-            engine,
+            strengths,
             books: Books::default(),
             told: Books::default(),
             passages: Passages::default(),
             steps: 0,
-        }
+        };
+        scheme.step = match length {
+            Length::Fixed(step) => rounded(step),
+            Length::Within(_) => 0.0,
+        };
+        scheme
     }
 
     /// Resolves all events up to simulated time `end` (s). When and how often it is called changes nothing of what happens.
@@ -195,6 +240,7 @@ impl<S: Surface, C: Calendar> Substepped<S, C> {
     ) -> Result<ControlFlow<()>, Broken> {
         loop {
             if self.engine.time() >= self.step_end {
+                self.choose_step()?;
                 self.kick()?;
             }
             let until = end.min(self.step_end);
@@ -207,19 +253,86 @@ impl<S: Surface, C: Calendar> Substepped<S, C> {
         }
     }
 
+    /// Chooses the length of the next sub-steps.
+    fn choose_step(&mut self) -> Result<(), Broken> {
+        let Length::Within(tolerance) = self.length else { return Ok(()) };
+        if self.steps % STEPS_PER_CHECK != 0 {
+            return Ok(());
+        }
+        let longest = self.longest_step()?;
+        if self.forces.near_field.is_none() {
+            // Gravity is exact whatever the length.
+            self.step = rounded(longest);
+            return Ok(());
+        }
+        if self.step == 0.0 {
+            self.step = rounded(longest);
+        }
+        for _ in 0..ATTEMPTS {
+            let error = self.local_error()?;
+            // The local error of the places goes with the cube of the length.
+            let factor = (CAUTIOUS * (tolerance / error).cbrt()).clamp(GROWTH[0], GROWTH[1]);
+            let met = error <= tolerance;
+            self.step = rounded((self.step * factor).min(longest));
+            if met {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// The longest sub-step (s) whose chords are near enough to the paths.
+    fn longest_step(&mut self) -> Result<f64, Broken> {
+        let mut strongest = self.forces.gravity.norm();
+        if let Some(near_field) = &mut self.forces.near_field {
+            let found = self.engine.snapshot(self.engine.time(), |snapshot| {
+                let places: Vec<_> = snapshot.flights.iter().map(|flight| flight.position).collect();
+                let strengths: Vec<_> = snapshot.grains.iter().map(|grain| grain.strength).collect();
+                let mut forces = vec![Vector3::zeros(); places.len()];
+                near_field.forces(&places, Some(&strengths), &mut forces)?;
+                Ok(forces.iter().zip(snapshot.grains).map(|(force, grain)| force.norm() / grain.mass).fold(0.0, f64::max))
+            });
+            strongest += found.map_err(|singular| self.engine.singular(&singular))?;
+        }
+        let smallest = self.engine.smallest_radius();
+        // Nothing pulls, or there is no grain: any length will do, until something happens.
+        let sag = (8.0 * SAG * smallest / strongest).sqrt();
+        Ok(if sag.is_finite() && sag > 0.0 { sag } else { 1.0 })
+    }
+
+    /// Largest difference in position of any grain between one whole and two half sub-steps from now on, over its radius.
+    fn local_error(&self) -> Result<f64, Broken> {
+        let end = self.engine.time() + self.step;
+        let run = |step: f64| {
+            let mut trial = Self { length: Length::Fixed(step), step, ..self.clone() };
+            let flow = trial.advance(end, &mut (), &mut |_| ControlFlow::Continue(()))?;
+            debug_assert!(flow.is_continue());
+            Ok(trial)
+        };
+        let (whole, halves) = (run(self.step)?, run(0.5 * self.step)?);
+        let places = |trial: &Self| trial.engine.snapshot(end, |snapshot| snapshot.flights.to_vec());
+        let apart = places(&whole).iter().zip(places(&halves)).map(|(one, other)| {
+            self.domain.nearest(one.position - other.position).norm() / one.radius
+        }).fold(0.0, f64::max);
+        Ok(apart)
+    }
+
     /// Ends a sub-step and starts the next.
     fn kick(&mut self) -> Result<(), Broken> {
-        let ended = if self.steps == 0 { 0.0 } else { self.step };
+        let ended = self.ended;
         self.books.held(&self.engine.take_held());
-        let Self { engine, forces, laws, resting, pull, starts, domain, books, step, .. } = self;
+        let Self { engine, forces, laws, resting, pull, starts, domain, books, step, strengths, .. } = self;
         let step = *step;
         let strongest = pull.iter().map(|pull| pull.norm()).fold(forces.gravity.norm(), f64::max);
         let reach = Resting::reach(engine.largest_radius(), 2.0 * strongest, step);
         let (gravity, mut outcome) = (forces.gravity, Ok(()));
-        let near_field = forces.near_field.as_ref().map(|sum| *sum.law());
-        engine.start_sub_step(reach, gravity, near_field, |surface, touches, grains, flights, accelerations| {
+        // Where contact lies within the switch of a cut-off, the force at contact is not that of the law: then that of the kick is kept.
+        let plain_at_contact = |sum: &&ForceSum| sum.is_plain_within(2.0 * engine.largest_radius());
+        let near_field = forces.near_field.as_ref().filter(plain_at_contact).map(|sum| *sum.law());
+        let under = Under { reach, gravity, near_field, contact_time: forces.contact_time };
+        engine.start_sub_step(&under, |surface, touches, grains, flights, accelerations| {
             let end = accelerations.to_vec();
-            outcome = forces.pull(grains, flights, pull);
+            outcome = forces.pull(grains, flights, *strengths, pull);
             accelerations.copy_from_slice(pull);
             let strongest = pull.iter().map(|pull| pull.norm()).fold(0.0, f64::max);
             resting.find(surface, touches, grains, flights, pull, step, [&laws.grain, &laws.surface]);
@@ -255,6 +368,7 @@ impl<S: Surface, C: Calendar> Substepped<S, C> {
         });
         outcome.map_err(|singular| self.engine.singular(&singular))?;
         self.steps += 1;
+        self.ended = step;
         self.step_end = self.engine.time() + step;
         Ok(())
     }
@@ -280,7 +394,8 @@ impl<S: Surface, C: Calendar> Substepped<S, C> {
             let depth = snapshot.flights.iter().zip(snapshot.grains).map(|(flight, grain)| grain.mass * flight.position.dot(&self.forces.gravity)).sum();
             let potential = self.forces.near_field.as_mut().map(|near_field| {
                 let positions: Vec<_> = snapshot.flights.iter().map(|flight| flight.position).collect();
-                near_field.potential_energy(&positions, None)
+                let strengths: Vec<_> = snapshot.grains.iter().map(|grain| grain.strength).collect();
+                near_field.potential_energy(&positions, Some(&strengths))
             });
             (depth, potential.transpose())
         });
@@ -297,6 +412,7 @@ impl<S: Surface, C: Calendar> Substepped<S, C> {
 
     /// Takes a grain in at simulated time `time` (s), to which the run has been advanced. The near field acts on it from the next sub-step on.
     pub fn enter(&mut self, time: f64, new: &NewGrain, observer: &mut impl Observer) {
+        self.strengths |= new.strength != 1.0;
         self.engine.enter(time, new, &mut (&mut self.passages, observer));
     }
 
