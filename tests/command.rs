@@ -91,6 +91,62 @@ fn a_reader_that_stops_reading_is_no_failure() {
     assert!(run.wait().expect("it ends").success());
 }
 
+/// What `impinge check` says of a scene with some changes, as `--set` takes them.
+fn checked(scene: &str, changes: &[&str]) -> String {
+    let mut command = impinge();
+    command.args(["check", &format!("examples/{scene}.toml")]);
+    changes.iter().for_each(|change| _ = command.args(["--set", change]));
+    let output = command.output().expect("it runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).expect("UTF-8")
+}
+
+#[test]
+fn impinge_check_tells_what_forces_will_do() {
+    let free = checked("erosive_jet", &[]);
+    assert!(!free.contains("sub-step") && !free.contains("near field"), "{free}");
+
+    let falling = checked("erosive_jet", &["run.gravity=[0, 0, -9.81]", "run.substep=1e-4", "contact.time=1e-6"]);
+    for part in ["gravity     [0.0, 0.0, -9.81] m/s²", "0.0001 s, 600 of them", "contacts take 0.000001 s"] {
+        assert!(falling.contains(part), "without {part:?}:\n{falling}");
+    }
+    assert!(!falling.contains("near field"), "{falling}");
+
+    // PHYSICS 0.3: an exchanged ratio puts the barrier far above the energy of the jet, 114 J a grain.
+    let exploding = checked("erosive_jet", &["near_field={ alpha1 = 1e3, beta1 = 2, alpha2 = 5e5, beta2 = 3 }"]);
+    let [barrier, attraction] = [5e5 / (2.0 * 0.02_f64.powi(2)), 1e3 / 0.02];
+    let potential: f64 = format!("{:.2e}", barrier - attraction).parse().expect("a number");
+    for part in [
+        "attraction 1000 r^-2 N, repulsion 500000 r^-3 N",
+        "in balance at 500 m between centres",
+        "summed by a tree, to a relative error of 0.0001",
+        "chosen so that its error stays within 0.000001 radii",
+        &format!("potential at contact {potential} J"),
+        "warning     source[0]: grains near each other fly apart",
+    ] {
+        assert!(exploding.contains(part), "without {part:?}:\n{exploding}");
+    }
+
+    let weak = "near_field={ alpha1 = 1e-6, beta1 = 2, alpha2 = 2e-9, beta2 = 3, sum = \"cut-off\", cutoff = 0.5, substep = 1e-5 }";
+    let spreading = checked("two_grains", &[weak]);
+    for part in [
+        "in balance at 0.002 m",
+        "over pairs closer than 0.5 m, fading from 0.4 m on",
+        "0.00001 s, 10000 of them",
+        "times the kinetic energy",
+    ] {
+        assert!(spreading.contains(part), "without {part:?}:\n{spreading}");
+    }
+    assert!(!spreading.contains("warning"), "{spreading}");
+
+    let short = "near_field={ alpha1 = 1, beta1 = 0, alpha2 = 0, beta2 = 3, sum = \"cut-off\", cutoff = 0.01 }";
+    let idle = checked("erosive_jet", &[short]);
+    assert!(idle.contains("in balance at no distance") && idle.contains("no force acts beyond 0.01 m"), "{idle}");
+    let binding =
+        checked("erosive_jet", &["near_field={ alpha1 = 1e9, beta1 = 1, alpha2 = 0, beta2 = 3, sum = \"direct\" }"]);
+    assert!(binding.contains("they will form clusters") && binding.contains("summed over all pairs"), "{binding}");
+}
+
 #[test]
 fn what_impinge_check_prints_of_every_example() {
     for (scene, expected) in [

@@ -6,7 +6,7 @@ use impinge::scene::{Friction, Scene, SceneFile, Source, Surface};
 use impinge::simulation::Simulation;
 
 use super::estimate::Crowd;
-use super::{Ending, Failure, SceneArgs, print};
+use super::{Ending, Failure, SceneArgs, digits, forces, print};
 
 /// Memory that a grain may take with its events and neighbours, bytes: the bound that the engine is held to.
 const BYTES_PER_GRAIN: f64 = 600.0;
@@ -44,7 +44,8 @@ fn describe(out: &mut String, file: &SceneFile, simulation: &Simulation) -> fmt:
             writeln!(out, "contact     {name}: restitution {}, {}", contact.restitution, friction(&contact.friction))?;
         }
     }
-    sources(out, scene, simulation.counts())?;
+    let count = sources(out, scene, simulation.counts())?;
+    forces::describe(out, scene, file.folder(), count)?;
     for (i, surface) in scene.surface.iter().enumerate() {
         writeln!(out, "surface[{i}]  {}", surface_in_words(surface))?;
         for (_, report) in simulation.surface().reports().filter(|(number, _)| *number == i) {
@@ -56,7 +57,8 @@ fn describe(out: &mut String, file: &SceneFile, simulation: &Simulation) -> fmt:
     Ok(())
 }
 
-fn sources(out: &mut String, scene: &Scene, placed: &[usize]) -> fmt::Result {
+/// Describes the sources and tells how many grains they give in all.
+fn sources(out: &mut String, scene: &Scene, placed: &[usize]) -> Result<f64, fmt::Error> {
     let mut count = 0.0;
     let what = if scene.domain.planar { "area fraction" } else { "volume fraction" };
     for (i, (source, &rows)) in scene.source.iter().zip(placed).enumerate() {
@@ -89,12 +91,8 @@ fn sources(out: &mut String, scene: &Scene, placed: &[usize]) -> fmt::Result {
         }
     }
     let megabytes = digits(count * BYTES_PER_GRAIN / 1e6, 2);
-    writeln!(out, "in all      {count} grains, at most {megabytes} MB ({BYTES_PER_GRAIN} bytes a grain)")
-}
-
-/// A number rounded to so many digits.
-fn digits(number: f64, count: usize) -> f64 {
-    format!("{number:.*e}", count - 1).parse().unwrap_or(number)
+    writeln!(out, "in all      {count} grains, at most {megabytes} MB ({BYTES_PER_GRAIN} bytes a grain)")?;
+    Ok(count)
 }
 
 fn friction(friction: &Friction) -> String {

@@ -49,8 +49,8 @@ pub(super) struct Crowd {
     density: f64,
     /// Width of the stream across its velocity, m; the narrower of the two.
     width: f64,
-    /// Whether the whole moves.
-    streams: bool,
+    /// Speed of the whole, m/s.
+    speed: f64,
     /// Standard deviation of a velocity component, m/s.
     thermal_speed: f64,
     planar: bool,
@@ -113,7 +113,7 @@ impl Crowd {
             material: filled.density.unwrap_or(scene.grain.density),
             density: filled.count / axes.iter().map(|&i| side(i)).product::<f64>(),
             width: axes.iter().filter(|&&i| i != along).map(|&i| side(i)).fold(f64::INFINITY, f64::min),
-            streams: speed(along) > 0.0,
+            speed: axes.iter().map(|&i| speed(i).powi(2)).sum::<f64>().sqrt(),
             thermal_speed: filled.thermal_speed,
             planar,
         }
@@ -140,7 +140,7 @@ impl Crowd {
             material: nozzle.density.unwrap_or(scene.grain.density),
             density,
             width,
-            streams: true,
+            speed: nozzle.speed,
             thermal_speed: 0.0,
             planar,
         }
@@ -158,7 +158,18 @@ impl Crowd {
 
     /// Mass of all grains, kg.
     pub(super) fn mass(&self) -> f64 {
-        self.count * self.material * self.radius.content(false)
+        self.count * self.grain_mass()
+    }
+
+    /// Mean mass of a grain, kg.
+    pub(super) fn grain_mass(&self) -> f64 {
+        self.material * self.radius.content(false)
+    }
+
+    /// Mean kinetic energy of a grain at the start, J.
+    pub(super) fn kinetic_energy(&self) -> f64 {
+        let axes = if self.planar { 2.0 } else { 3.0 };
+        0.5 * self.grain_mass() * (self.speed.powi(2) + axes * self.thermal_speed.powi(2))
     }
 
     /// Mean free path of a dilute gas as dense as this, m: 1 / (√2 n π d²), or 1 / (√2 n 2 d) in a planar scene.
@@ -175,7 +186,7 @@ impl Crowd {
             let duration = scene.run.until - scene.run.start;
             return Some((0.5 * self.count * self.enskog_rate() * duration, ENSKOG));
         }
-        let meets = self.streams && !scene.surface.is_empty() && scene.domain.boundary == Boundary::Open;
+        let meets = self.speed > 0.0 && !scene.surface.is_empty() && scene.domain.boundary == Boundary::Open;
         meets.then(|| (self.count * self.width / self.mean_free_path(), CROSSING))
     }
 

@@ -5,6 +5,7 @@
 
 mod check;
 mod estimate;
+mod forces;
 mod progress;
 mod run;
 mod schema;
@@ -122,4 +123,9 @@ fn print(text: &str) -> Result<(), Failure> {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
         result => Ok(result?),
     }
+}
+
+/// A number rounded to so many digits.
+fn digits(number: f64, count: usize) -> f64 {
+    format!("{number:.*e}", count - 1).parse().unwrap_or(number)
 }

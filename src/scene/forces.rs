@@ -6,6 +6,9 @@ use super::{Boundary, Invalid, NearField, Radius, Scene, Source, Substep, Summat
 /// Most sub-steps of a run: at a microsecond each they take eleven days. More is a misplaced exponent.
 const SUBSTEPS_MAX: f64 = 1e12;
 
+/// Where the switch to no force may begin at the earliest, over the cut-off: a wider one would no longer leave the force as it is.
+const SWITCH_MIN: f64 = 0.5;
+
 /// Largest bound on the error of the tree; above it the sum is no longer an approximation of anything.
 const ACCURACY_MAX: f64 = 0.1;
 
@@ -134,10 +137,12 @@ fn summation(scene: &Scene, near_field: &NearField) -> Checked {
         return invalid("cutoff", what, "give half the smallest period at most, or enlarge the domain");
     }
     match switch {
-        Some(switch) if !(0.0..cutoff).contains(&switch) => {
+        Some(switch) if !(SWITCH_MIN * cutoff..cutoff).contains(&switch) => {
+            let from = SWITCH_MIN * cutoff;
             let what =
-                format!("{switch} m is outside [0, {cutoff}), where a switch to no force at {cutoff} m can begin");
-            invalid("switch", what, "begin it below `cutoff`; 0.8 `cutoff` is usual, and is taken where it is left out")
+                format!("{switch} m is outside [{from}, {cutoff}), where a switch to no force at {cutoff} m can begin");
+            let remedy = "begin it below `cutoff`, at half of it at the earliest; left out, it begins at 0.8 `cutoff`";
+            invalid("switch", what, remedy)
         }
         _ => Ok(()),
     }

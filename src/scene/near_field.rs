@@ -35,7 +35,8 @@ pub struct NearField {
     pub sum: Summation,
     /// With `sum = "cut-off"`: distance from which on there is no force, m; at most half the smallest period of a periodic domain.
     pub cutoff: Option<f64>,
-    /// With `sum = "cut-off"`: distance at which a smooth switch to no force begins, m. 0.8 `cutoff` where left out.
+    /// With `sum = "cut-off"`: distance at which a smooth switch to no force begins, m: from half of `cutoff` on, and 0.8 `cutoff` where
+    /// left out.
     pub switch: Option<f64>,
     /// Bound on the relative error of the force that a tree sums; above 0, at most 0.1.
     #[serde(default = "default_accuracy")]
