@@ -6,11 +6,11 @@ use std::path::Path;
 use impinge_events::Domain;
 use nalgebra::Vector3;
 
-use crate::law::{ContactLaw, Friction};
-use crate::scene::{Boundary, Interference, Invalid, Scene};
 use crate::grains::NewGrain;
+use crate::law::{ContactLaw, Friction};
 use crate::law::{NearField, Term};
 use crate::near_field::{CutOff, ForceSum, Method};
+use crate::scene::{Boundary, Interference, Invalid, Scene};
 use crate::scene::{Substep, Summation};
 use crate::scheme::{Broken, EventDriven, Forces, Laws, Length, Moments, Observer, Progress, Substepped};
 use crate::source::{self, Nozzle};

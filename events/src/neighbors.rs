@@ -199,7 +199,7 @@ impl Flow {
             (Self { velocity, growth }, rests.iter().map(|rest| (rest - velocity).abs()).sum::<f64>())
         };
         let (still, to_cross) = with(0.0);
-        if !(rise > 0.0) {
+        if rise.is_nan() || rise <= 0.0 {
             return still;
         }
         let (flow, less) = with(rise / spread);
@@ -230,7 +230,13 @@ impl Cells {
     }
 
     /// The same with cells that are wider than a contact by `skin` (m).
-    pub(crate) fn with_skin(domain: Domain, largest_radius: f64, skin: f64, flights: &[Flight], now: f64) -> Option<Self> {
+    pub(crate) fn with_skin(
+        domain: Domain,
+        largest_radius: f64,
+        skin: f64,
+        flights: &[Flight],
+        now: f64,
+    ) -> Option<Self> {
         let radius = largest_radius + 0.5 * skin;
         domain.holds(radius).then(|| Self::new(domain, radius, flights, now))
     }

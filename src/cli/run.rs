@@ -63,7 +63,9 @@ pub(super) fn run(args: &Args) -> Result<Ending, Failure> {
                 Broken::Jammed { .. } => {
                     "grains that lose much in every collision gather and collide ever faster: raise `restitution` or lower `friction`"
                 }
-                Broken::Singular { .. } => "shorten the sub-step, or give grains that attract each other a radius that keeps them apart",
+                Broken::Singular { .. } => {
+                    "shorten the sub-step, or give grains that attract each other a radius that keeps them apart"
+                }
                 Broken::OutOfPlane { .. } => "give the scene a surface that does not change along y",
                 Broken::Overlap { .. } | Broken::NotANumber { .. } => "please report the scene",
             };

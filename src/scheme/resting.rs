@@ -187,7 +187,19 @@ impl Resting {
         let shear = shear - normal * shear.dot(&normal);
         let (closing, slipping) = (0.0, Vector3::zeros());
         self.contacts.push(Contact {
-            first, second, element, normal, velocity, mass, gap, closing, slipping, stick, slip, support, shear,
+            first,
+            second,
+            element,
+            normal,
+            velocity,
+            mass,
+            gap,
+            closing,
+            slipping,
+            stick,
+            slip,
+            support,
+            shear,
         });
     }
 
@@ -203,13 +215,7 @@ impl Resting {
 
     /// Adds what contacts carry to the accelerations `pull` (m/s²), so that no contact at rest is pressed together, and slip ends within `step`
     /// (s) where friction can end it. Gives angular accelerations to [`angular`](Self::angular).
-    pub(super) fn carry(
-        &mut self,
-        grains: &[Grain],
-        flights: &[Flight],
-        pull: &mut [Vector3<f64>],
-        step: f64,
-    ) {
+    pub(super) fn carry(&mut self, grains: &[Grain], flights: &[Flight], pull: &mut [Vector3<f64>], step: f64) {
         self.angular.clear();
         self.angular.resize(flights.len(), Vector3::zeros());
         let largest = pull.iter().map(|pull| pull.norm()).fold(0.0, f64::max);
@@ -244,7 +250,8 @@ impl Resting {
     /// Ends what contacts at rest still approach: velocities, as of now, in place. Gives what was done.
     pub(super) fn settle(&mut self, grains: &mut [Grain], flights: &mut [Flight], least: f64) -> Settled {
         let approaching = self.contacts.iter().any(|contact| {
-            let first = if contact.first == SURFACE { contact.velocity } else { flights[contact.first as usize].velocity };
+            let first =
+                if contact.first == SURFACE { contact.velocity } else { flights[contact.first as usize].velocity };
             (flights[contact.second as usize].velocity - first).dot(&contact.normal) < -least
         });
         let mut settled = Settled::default();
@@ -261,7 +268,9 @@ impl Resting {
         let before = energy(grains, flights);
         let mut field = Field { grains, flights, linear: &mut velocities, angular: &mut spins };
         sweep(&mut contacts, &mut field, least);
-        for ((flight, grain), (velocity, spin)) in flights.iter_mut().zip(grains.iter_mut()).zip(velocities.iter().zip(&spins)) {
+        for ((flight, grain), (velocity, spin)) in
+            flights.iter_mut().zip(grains.iter_mut()).zip(velocities.iter().zip(&spins))
+        {
             (flight.velocity, grain.spin) = (*velocity, *spin);
         }
         for contact in contacts.iter().filter(|contact| contact.first == SURFACE) {
@@ -288,7 +297,12 @@ impl Resting {
 
 /// Kinetic energy of all grains, J.
 fn energy(grains: &[Grain], flights: &[Flight]) -> f64 {
-    grains.iter().zip(flights).filter(|(_, flight)| flight.radius > 0.0).map(|(grain, flight)| crate::grains::kinetic_energy(flight, grain)).sum()
+    grains
+        .iter()
+        .zip(flights)
+        .filter(|(_, flight)| flight.radius > 0.0)
+        .map(|(grain, flight)| crate::grains::kinetic_energy(flight, grain))
+        .sum()
 }
 
 /// Gauss–Seidel sweeps over the contacts until nothing changes by more than `least`.

@@ -96,8 +96,12 @@ struct Start {
     carried: Vector3<f64>,
 }
 
-const NOBODY: Start =
-    Start { id: u64::MAX, position: Vector3::new(0.0, 0.0, 0.0), pull: Vector3::new(0.0, 0.0, 0.0), carried: Vector3::new(0.0, 0.0, 0.0) };
+const NOBODY: Start = Start {
+    id: u64::MAX,
+    position: Vector3::new(0.0, 0.0, 0.0),
+    pull: Vector3::new(0.0, 0.0, 0.0),
+    carried: Vector3::new(0.0, 0.0, 0.0),
+};
 
 /// Accelerations of a grain on both sides of a kick, m/s².
 struct Change {
@@ -113,7 +117,14 @@ impl Start {
     /// Work of contacts and of the near field (J) on a grain that was displaced by `moved` (m) with a chord of `velocity` (m/s), until after a kick
     /// that ends a sub-step of length `step` (s): force times way within the sub-step, and what the change of forces does to the velocity at
     /// its end. Gravity does not change.
-    fn work(&self, moved: Vector3<f64>, velocity: Vector3<f64>, change: &Change, gravity: Vector3<f64>, step: f64) -> (f64, f64) {
+    fn work(
+        &self,
+        moved: Vector3<f64>,
+        velocity: Vector3<f64>,
+        change: &Change,
+        gravity: Vector3<f64>,
+        step: f64,
+    ) -> (f64, f64) {
         let Change { end, pull, carried } = *change;
         let mean = velocity + (end + pull + carried) * (0.25 * step);
         // Without a near field all that was added within the sub-step came from contacts.
@@ -290,7 +301,11 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
                 let strengths: Vec<_> = snapshot.grains.iter().map(|grain| grain.strength).collect();
                 let mut forces = vec![Vector3::zeros(); places.len()];
                 near_field.forces(&places, Some(&strengths), &mut forces)?;
-                Ok(forces.iter().zip(snapshot.grains).map(|(force, grain)| force.norm() / grain.mass).fold(0.0, f64::max))
+                Ok(forces
+                    .iter()
+                    .zip(snapshot.grains)
+                    .map(|(force, grain)| force.norm() / grain.mass)
+                    .fold(0.0, f64::max))
             });
             strongest += found.map_err(|singular| self.engine.singular(&singular))?;
         }
@@ -311,9 +326,11 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
         };
         let (whole, halves) = (run(self.step)?, run(0.5 * self.step)?);
         let places = |trial: &Self| trial.engine.snapshot(end, |snapshot| snapshot.flights.to_vec());
-        let apart = places(&whole).iter().zip(places(&halves)).map(|(one, other)| {
-            self.domain.nearest(one.position - other.position).norm() / one.radius
-        }).fold(0.0, f64::max);
+        let apart = places(&whole)
+            .iter()
+            .zip(places(&halves))
+            .map(|(one, other)| self.domain.nearest(one.position - other.position).norm() / one.radius)
+            .fold(0.0, f64::max);
         Ok(apart)
     }
 
@@ -391,7 +408,12 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
         }
         books.carried_away = self.passages.depth(self.forces.gravity);
         let (depth, potential) = self.engine.snapshot(time, |snapshot| {
-            let depth = snapshot.flights.iter().zip(snapshot.grains).map(|(flight, grain)| grain.mass * flight.position.dot(&self.forces.gravity)).sum();
+            let depth = snapshot
+                .flights
+                .iter()
+                .zip(snapshot.grains)
+                .map(|(flight, grain)| grain.mass * flight.position.dot(&self.forces.gravity))
+                .sum();
             let potential = self.forces.near_field.as_mut().map(|near_field| {
                 let positions: Vec<_> = snapshot.flights.iter().map(|flight| flight.position).collect();
                 let strengths: Vec<_> = snapshot.grains.iter().map(|grain| grain.strength).collect();

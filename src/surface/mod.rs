@@ -253,12 +253,10 @@ impl Part {
     /// Exact for a plane; of a mesh the chord is taken.
     fn first_contact_bent(&self, flight: &Flight, bend: &Bend, until: f64) -> Outlook {
         match &self.shape {
-            Shape::Plane { point, normal } => {
-                match sphere_plane_bent(&self.seen(flight), bend, *point, *normal) {
-                    Some(time) => Outlook::Hit { time, element: self.first_element },
-                    None => Outlook::ClearUntil(f64::INFINITY),
-                }
-            }
+            Shape::Plane { point, normal } => match sphere_plane_bent(&self.seen(flight), bend, *point, *normal) {
+                Some(time) => Outlook::Hit { time, element: self.first_element },
+                None => Outlook::ClearUntil(f64::INFINITY),
+            },
             Shape::Mesh(_) => self.first_contact(flight, until),
         }
     }
@@ -290,7 +288,8 @@ impl Part {
                     let arm = centre - nearest;
                     let distance = arm.norm();
                     if distance > 0.0 && seen.is_new(arm / distance) {
-                        let contact = SurfaceContact { normal: arm / distance, gap: distance - flight.radius, velocity };
+                        let contact =
+                            SurfaceContact { normal: arm / distance, gap: distance - flight.radius, velocity };
                         visit(self.first_element + element, contact);
                     }
                 });

@@ -3,10 +3,16 @@
 use nalgebra::Vector3;
 
 use crate::calendar::{Calendar, Event, Kind, Tournament};
-use crate::contact_time::{sphere_sphere, sphere_sphere_yielding, spheres_may_touch};
-use crate::lists::{Lists, skin};
+use crate::lists::Lists;
 use crate::neighbors::Cells;
 use crate::{Bend, Domain, Flight, NoSurface, Outlook, Surface};
+
+mod plan;
+mod sub_step;
+
+pub use self::plan::YIELDING;
+use self::plan::{NO_PLAN, NOBODY, Plan, Search, never};
+pub use self::sub_step::Touch;
 
 /// What happens next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,55 +38,8 @@ pub enum Encounter {
     },
 }
 
-/// No partner.
-const NOBODY: u32 = u32::MAX;
-
-/// By this part of the smaller radius grains that touch under force may overlap before they meet again ([`sphere_sphere_yielding`]).
-pub const YIELDING: f64 = 1e-6;
-
 /// After so many crossings a grain the layout of the cells is thought over.
 const CROSSINGS_PER_GRAIN: usize = 8;
-
-/// The earliest of each sort of event that lies before a grain.
-#[derive(Clone, Copy, Debug)]
-struct Plan {
-    /// With another grain ([`Kind::Grains`]) or, where that grain has been deflected meanwhile, a new look ([`Kind::Review`]).
-    pair: Event,
-    /// With the surface or a side of the domain.
-    side: Event,
-    /// Until when the surface has been looked at, s.
-    looked_until: f64,
-    /// Out of its cell, along the axis `partner`.
-    crossing: Event,
-    /// Whether the surface stops this grain.
-    stopped_by_surface: bool,
-}
-
-const fn never(kind: Kind) -> Event {
-    Event { time: f64::INFINITY, kind, partner: NOBODY }
-}
-
-const NO_PLAN: Plan = Plan {
-    pair: never(Kind::Review),
-    side: never(Kind::Exit),
-    looked_until: f64::NEG_INFINITY,
-    crossing: never(Kind::Crossing),
-    stopped_by_surface: true,
-};
-
-impl Plan {
-    /// The first of the three; they stand in the order of their kinds, so the earlier one wins where times are equal.
-    #[inline]
-    fn first(&self) -> Event {
-        let mut first = self.crossing;
-        for event in [self.pair, self.side] {
-            if event.time < first.time {
-                first = event;
-            }
-        }
-        first
-    }
-}
 
 /// Who can meet whom.
 #[derive(Clone, Debug)]
@@ -91,17 +50,6 @@ enum Neighbors {
     Cells(Cells),
     /// For short sub-steps.
     Lists(Lists),
-}
-
-/// Two grains that touch or nearly do.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Touch {
-    /// The lower number.
-    pub a: u32,
-    /// The higher number.
-    pub b: u32,
-    /// From the centre of `a` to that of `b`, m.
-    pub apart: Vector3<f64>,
 }
 
 /// Grains in free flight, and the order in which they meet each other and the surface.
@@ -191,31 +139,6 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     #[must_use]
     pub fn flight(&self, grain: u32) -> &Flight {
         &self.flights[grain as usize]
-    }
-
-    /// How a grain departs from its stored flight, its chord; not at all where nothing accelerates it.
-    #[inline]
-    #[must_use]
-    pub fn bend(&self, grain: u32) -> Bend {
-        let acceleration = self.accelerations.get(grain as usize).copied().unwrap_or_else(Vector3::zeros);
-        let step = if self.horizon < f64::INFINITY { self.horizon } else { 0.0 };
-        Bend { acceleration, step }
-    }
-
-    /// Adds to the acceleration (m/s²) of a grain that has just met something, as if it had been so since the sub-step began: the chord stays.
-    pub fn pull(&mut self, grain: u32, more: Vector3<f64>) {
-        self.accelerations[grain as usize] += more;
-    }
-
-    /// Changes the acceleration (m/s²) of a grain that has just met something and is yet to be deflected: place and velocity stay, the chord
-    /// changes.
-    pub fn accelerate(&mut self, grain: u32, acceleration: Vector3<f64>) {
-        let before = self.bend(grain);
-        self.accelerations[grain as usize] = acceleration;
-        let after = self.bend(grain);
-        let flight = &mut self.flights[grain as usize];
-        flight.position += before.offset(flight.time) - after.offset(flight.time);
-        flight.velocity += before.velocity(flight.time) - after.velocity(flight.time);
     }
 
     /// The numbers of all grains that are inside, in ascending order.
@@ -372,40 +295,6 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         self.resume(next);
     }
 
-    /// Starts a new sub-step like an epoch. `kick` is given the surface, all grains that are nearer to each other than `reach` (m), and all
-    /// flights, as they are at that moment, to change their velocities (m/s) to those of the chords, and their accelerations (m/s²) to set; a
-    /// grain that has been taken out has the radius 0. It gives the length of the sub-step (s).
-    pub fn start_sub_step(
-        &mut self,
-        duration: f64,
-        reach: f64,
-        kick: impl FnOnce(&S, &[Touch], &mut [Flight], &mut [Vector3<f64>]) -> f64,
-    ) {
-        self.halt(duration);
-        self.accelerations.resize(self.flights.len(), Vector3::zeros());
-        let touches = self.touches(reach);
-        let next = kick(&self.surface, &touches, &mut self.flights, &mut self.accelerations);
-        self.resume(next);
-    }
-
-    /// All pairs of grains, standing at time 0, that are nearer to each other than `reach` (m), in the order of their numbers.
-    fn touches(&self, reach: f64) -> Vec<Touch> {
-        let mut touches = Vec::new();
-        for a in self.inside() {
-            let ours = self.flights[a as usize];
-            self.visit(a, |b, _| {
-                let theirs = self.flights[b as usize];
-                let apart = self.domain.nearest(theirs.position - ours.position);
-                let within = ours.radius + theirs.radius + reach;
-                if a < b && apart.norm_squared() < within * within {
-                    touches.push(Touch { a, b, apart });
-                }
-            });
-        }
-        touches.sort_unstable_by_key(|touch| (touch.a, touch.b));
-        touches
-    }
-
     /// Calls `visit` with every grain that can soon touch `grain`, and the shift (m) of its image.
     #[inline]
     fn visit(&self, grain: u32, mut visit: impl FnMut(u32, Vector3<f64>)) {
@@ -449,35 +338,6 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
                 self.lay_out_cells(0.0);
             }
         }
-        self.predict_all();
-    }
-
-    /// Makes neighbour lists for the coming sub-steps, where there are such and it pays.
-    fn make_lists(&mut self) -> bool {
-        if self.accelerations.is_empty() {
-            return false;
-        }
-        let (flights, largest) = self.flights_and_largest_radius();
-        let Some(skin) = skin(flights.iter(), largest, self.horizon) else { return false };
-        let Some(mut cells) = Cells::with_skin(self.domain, largest, skin, &flights, 0.0) else { return false };
-        for grain in self.inside() {
-            cells.insert(grain, self.flight(grain), 0.0);
-        }
-        let lists = Lists::new(&cells, &self.flights, skin);
-        let hold = self.inside().all(|grain| lists.holds(grain, self.flight(grain), self.horizon));
-        if hold {
-            self.neighbors = Neighbors::Lists(lists);
-        }
-        hold
-    }
-
-    /// Turns from lists to cells where a grain has become too fast for them.
-    #[cold]
-    fn leave_lists(&mut self, now: f64) {
-        for flight in self.flights.iter_mut().filter(|flight| !is_vacant(flight)) {
-            self.domain.wrap(&mut flight.position);
-        }
-        self.lay_out_cells(now);
         self.predict_all();
     }
 
@@ -613,7 +473,16 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         let (flight, plan) = (self.flights[grain as usize], &self.plans[grain as usize]);
         let until = plan.pair.time.min(plan.side.time).min(self.horizon);
         let under_force = !self.accelerations.is_empty();
-        Search { grain, flight, until, under_force, flights: &self.flights, plans: &self.plans, best: plan.pair, looks: 0 }
+        Search {
+            grain,
+            flight,
+            until,
+            under_force,
+            flights: &self.flights,
+            plans: &self.plans,
+            best: plan.pair,
+            looks: 0,
+        }
     }
 
     /// Puts a meeting into the plans of both grains, and leaves the one that `grain` or its new partner had in mind before.
@@ -669,55 +538,6 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             self.calendar.cancel(grain);
         } else {
             self.calendar.schedule(grain, first);
-        }
-    }
-}
-
-/// A search for the first grain that `grain` meets.
-struct Search<'a> {
-    grain: u32,
-    flight: Flight,
-    /// Later meetings do not count, s.
-    until: f64,
-    /// Whether grains press against each other.
-    under_force: bool,
-    flights: &'a [Flight],
-    plans: &'a [Plan],
-    /// The best so far.
-    best: Event,
-    /// How many have been looked at.
-    looks: usize,
-}
-
-impl Search<'_> {
-    /// Takes the meeting with `other` for the best if it comes before all that either of the two has planned.
-    ///
-    /// What `other` has planned earlier will deflect it, and then it looks for itself; so does whoever it leaves.
-    #[inline]
-    fn consider(&mut self, other: u32, shift: Vector3<f64>) {
-        self.looks += 1;
-        let theirs = &self.flights[other as usize];
-        if !spheres_may_touch(&self.flight, theirs, shift, self.until) {
-            return;
-        }
-        let met = if self.under_force {
-            let slack = YIELDING * self.flight.radius.min(theirs.radius);
-            sphere_sphere_yielding(&self.flight, theirs, shift, slack)
-        } else {
-            sphere_sphere(&self.flight, theirs, shift)
-        };
-        let Some(time) = met else { return };
-        if time > self.until {
-            return;
-        }
-        let event = Event { time, kind: Kind::Grains, partner: other };
-        let theirs = &self.plans[other as usize];
-        // A meeting comes before the surface and the exit of either where the times are equal: the order of kinds.
-        if event.is_before(self.grain, &self.best, self.grain)
-            && event.is_before(self.grain, &theirs.pair, other)
-            && time <= theirs.side.time
-        {
-            (self.best, self.until) = (event, time);
         }
     }
 }

@@ -1,0 +1,103 @@
+//! What lies before each grain, and the search for its next partner.
+
+use nalgebra::Vector3;
+
+use crate::Flight;
+use crate::calendar::{Event, Kind};
+use crate::contact_time::{sphere_sphere, sphere_sphere_yielding, spheres_may_touch};
+
+/// No partner.
+pub(super) const NOBODY: u32 = u32::MAX;
+
+/// By this part of the smaller radius grains that touch under force may overlap before they meet again ([`sphere_sphere_yielding`]).
+pub const YIELDING: f64 = 1e-6;
+
+/// The earliest of each sort of event that lies before a grain.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Plan {
+    /// With another grain ([`Kind::Grains`]) or, where that grain has been deflected meanwhile, a new look ([`Kind::Review`]).
+    pub(super) pair: Event,
+    /// With the surface or a side of the domain.
+    pub(super) side: Event,
+    /// Until when the surface has been looked at, s.
+    pub(super) looked_until: f64,
+    /// Out of its cell, along the axis `partner`.
+    pub(super) crossing: Event,
+    /// Whether the surface stops this grain.
+    pub(super) stopped_by_surface: bool,
+}
+
+pub(super) const fn never(kind: Kind) -> Event {
+    Event { time: f64::INFINITY, kind, partner: NOBODY }
+}
+
+pub(super) const NO_PLAN: Plan = Plan {
+    pair: never(Kind::Review),
+    side: never(Kind::Exit),
+    looked_until: f64::NEG_INFINITY,
+    crossing: never(Kind::Crossing),
+    stopped_by_surface: true,
+};
+
+impl Plan {
+    /// The first of the three; they stand in the order of their kinds, so the earlier one wins where times are equal.
+    #[inline]
+    pub(super) fn first(&self) -> Event {
+        let mut first = self.crossing;
+        for event in [self.pair, self.side] {
+            if event.time < first.time {
+                first = event;
+            }
+        }
+        first
+    }
+}
+
+/// A search for the first grain that `grain` meets.
+pub(super) struct Search<'a> {
+    pub(super) grain: u32,
+    pub(super) flight: Flight,
+    /// Later meetings do not count, s.
+    pub(super) until: f64,
+    /// Whether grains press against each other.
+    pub(super) under_force: bool,
+    pub(super) flights: &'a [Flight],
+    pub(super) plans: &'a [Plan],
+    /// The best so far.
+    pub(super) best: Event,
+    /// How many have been looked at.
+    pub(super) looks: usize,
+}
+
+impl Search<'_> {
+    /// Takes the meeting with `other` for the best if it comes before all that either of the two has planned.
+    ///
+    /// What `other` has planned earlier will deflect it, and then it looks for itself; so does whoever it leaves.
+    #[inline]
+    pub(super) fn consider(&mut self, other: u32, shift: Vector3<f64>) {
+        self.looks += 1;
+        let theirs = &self.flights[other as usize];
+        if !spheres_may_touch(&self.flight, theirs, shift, self.until) {
+            return;
+        }
+        let met = if self.under_force {
+            let slack = YIELDING * self.flight.radius.min(theirs.radius);
+            sphere_sphere_yielding(&self.flight, theirs, shift, slack)
+        } else {
+            sphere_sphere(&self.flight, theirs, shift)
+        };
+        let Some(time) = met else { return };
+        if time > self.until {
+            return;
+        }
+        let event = Event { time, kind: Kind::Grains, partner: other };
+        let theirs = &self.plans[other as usize];
+        // A meeting comes before the surface and the exit of either where the times are equal: the order of kinds.
+        if event.is_before(self.grain, &self.best, self.grain)
+            && event.is_before(self.grain, &theirs.pair, other)
+            && time <= theirs.side.time
+        {
+            (self.best, self.until) = (event, time);
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! Sub-steps: flights as chords of accelerated grains, neighbours that last, grains that touch.
+
+use nalgebra::Vector3;
+
+use super::{Encounters, Neighbors, is_vacant};
+use crate::calendar::Calendar;
+use crate::lists::{Lists, skin};
+use crate::neighbors::Cells;
+use crate::{Bend, Flight, Surface};
+
+/// Two grains that touch or nearly do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Touch {
+    /// The lower number.
+    pub a: u32,
+    /// The higher number.
+    pub b: u32,
+    /// From the centre of `a` to that of `b`, m.
+    pub apart: Vector3<f64>,
+}
+
+impl<S: Surface, C: Calendar> Encounters<S, C> {
+    /// How a grain departs from its stored flight, its chord; not at all where nothing accelerates it.
+    #[inline]
+    #[must_use]
+    pub fn bend(&self, grain: u32) -> Bend {
+        let acceleration = self.accelerations.get(grain as usize).copied().unwrap_or_else(Vector3::zeros);
+        let step = if self.horizon < f64::INFINITY { self.horizon } else { 0.0 };
+        Bend { acceleration, step }
+    }
+
+    /// Adds to the acceleration (m/s²) of a grain that has just met something, as if it had been so since the sub-step began: the chord stays.
+    pub fn pull(&mut self, grain: u32, more: Vector3<f64>) {
+        self.accelerations[grain as usize] += more;
+    }
+
+    /// Changes the acceleration (m/s²) of a grain that has just met something and is yet to be deflected: place and velocity stay, the chord
+    /// changes.
+    pub fn accelerate(&mut self, grain: u32, acceleration: Vector3<f64>) {
+        let before = self.bend(grain);
+        self.accelerations[grain as usize] = acceleration;
+        let after = self.bend(grain);
+        let flight = &mut self.flights[grain as usize];
+        flight.position += before.offset(flight.time) - after.offset(flight.time);
+        flight.velocity += before.velocity(flight.time) - after.velocity(flight.time);
+    }
+
+    /// Starts a new sub-step like an epoch. `kick` is given the surface, all grains that are nearer to each other than `reach` (m), and all
+    /// flights, as they are at that moment, to change their velocities (m/s) to those of the chords, and their accelerations (m/s²) to set; a
+    /// grain that has been taken out has the radius 0. It gives the length of the sub-step (s).
+    pub fn start_sub_step(
+        &mut self,
+        duration: f64,
+        reach: f64,
+        kick: impl FnOnce(&S, &[Touch], &mut [Flight], &mut [Vector3<f64>]) -> f64,
+    ) {
+        self.halt(duration);
+        self.accelerations.resize(self.flights.len(), Vector3::zeros());
+        let touches = self.touches(reach);
+        let next = kick(&self.surface, &touches, &mut self.flights, &mut self.accelerations);
+        self.resume(next);
+    }
+
+    /// All pairs of grains, standing at time 0, that are nearer to each other than `reach` (m), in the order of their numbers.
+    fn touches(&self, reach: f64) -> Vec<Touch> {
+        let mut touches = Vec::new();
+        for a in self.inside() {
+            let ours = self.flights[a as usize];
+            self.visit(a, |b, _| {
+                let theirs = self.flights[b as usize];
+                let apart = self.domain.nearest(theirs.position - ours.position);
+                let within = ours.radius + theirs.radius + reach;
+                if a < b && apart.norm_squared() < within * within {
+                    touches.push(Touch { a, b, apart });
+                }
+            });
+        }
+        touches.sort_unstable_by_key(|touch| (touch.a, touch.b));
+        touches
+    }
+
+    /// Makes neighbour lists for the coming sub-steps, where there are such and it pays.
+    pub(super) fn make_lists(&mut self) -> bool {
+        if self.accelerations.is_empty() {
+            return false;
+        }
+        let (flights, largest) = self.flights_and_largest_radius();
+        let Some(skin) = skin(flights.iter(), largest, self.horizon) else { return false };
+        let Some(mut cells) = Cells::with_skin(self.domain, largest, skin, &flights, 0.0) else { return false };
+        for grain in self.inside() {
+            cells.insert(grain, self.flight(grain), 0.0);
+        }
+        let lists = Lists::new(&cells, &self.flights, skin);
+        let hold = self.inside().all(|grain| lists.holds(grain, self.flight(grain), self.horizon));
+        if hold {
+            self.neighbors = Neighbors::Lists(lists);
+        }
+        hold
+    }
+
+    /// Turns from lists to cells where a grain has become too fast for them.
+    #[cold]
+    pub(super) fn leave_lists(&mut self, now: f64) {
+        for flight in self.flights.iter_mut().filter(|flight| !is_vacant(flight)) {
+            self.domain.wrap(&mut flight.position);
+        }
+        self.lay_out_cells(now);
+        self.predict_all();
+    }
+}

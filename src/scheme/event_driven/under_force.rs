@@ -1,0 +1,244 @@
+//! What the engine does where forces act: sub-steps, synchronised kicks, contacts at rest within a sub-step.
+
+use impinge_events::calendar::Calendar;
+use impinge_events::{Flight, Surface, SurfaceContact, Touch, YIELDING};
+use nalgebra::Vector3;
+use rustc_hash::FxHashSet;
+
+use super::EventDriven;
+use crate::grains::Grain;
+use crate::law::{Body, External, NearField};
+use crate::near_field::Singular;
+use crate::scheme::Broken;
+
+/// A contact under force whose approach speed is below this part of what the force gives in a sub-step has come to rest. A bouncing grain then
+/// comes to rest early by this part of a sub-step over 1 - e.
+const STICKING: f64 = 1e-8;
+/// What is taken off an acceleration into a contact at rest, more than itself: enough that rounding leaves none of it.
+const RELIEF: f64 = 1.0 + 1.0 / (1u64 << 48) as f64;
+/// What acts in a sub-step.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::scheme) struct Under {
+    /// Grains nearer to each other than this (m) may be in contact at rest.
+    pub(in crate::scheme) reach: f64,
+    /// m/s²; what a grain that enters is accelerated at until the next sub-step.
+    pub(in crate::scheme) gravity: Vector3<f64>,
+    /// The near field, as it acts between two grains that touch.
+    pub(in crate::scheme) near_field: Option<NearField>,
+    /// How long a contact lasts for the impulse that forces give to it, s.
+    pub(in crate::scheme) contact_time: f64,
+}
+
+/// What the treatment of contacts at rest did within sub-steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Held {
+    /// Impulse of the surface on grains, N s; counted in the velocities of chords.
+    pub impulse_surface: Vector3<f64>,
+    /// What gravity and near field gave to grains that came or went, beyond or short of the kick before, N s.
+    pub impulse_gravity: Vector3<f64>,
+    /// The same of the near field.
+    pub impulse_near_field: Vector3<f64>,
+    /// Kinetic energy taken from grains at contacts with each other, J; negative where some was given.
+    pub dissipated_grain: f64,
+    /// The same at contacts with the surface.
+    pub dissipated_surface: f64,
+    /// How many contacts were held.
+    pub contacts: u64,
+}
+
+/// What the engine keeps of forces.
+#[derive(Clone, Debug, Default)]
+pub(super) struct UnderForce {
+    /// Whether they act: then the epoch is a sub-step, and somebody else says when the next one starts.
+    pub(super) acts: bool,
+    pub(super) under: Under,
+    /// Approach speed below which a contact has come to rest, m/s.
+    pub(super) resting_speed: f64,
+    /// The same for two grains, and for grains among others at the surface.
+    pub(super) resting_speed_of_pairs: f64,
+    /// Where the grains were at the last kick, m; empty without a near field.
+    anchors: Vec<Vector3<f64>>,
+    /// Pairs whose accelerations are those of their contact already.
+    synchronised: FxHashSet<[u32; 2]>,
+    /// What contacts at rest did since it was last asked.
+    pub(super) held: Held,
+}
+
+impl<S: Surface, C: Calendar> EventDriven<S, C> {
+    /// Starts a sub-step at the time that has been reached. `kick` is given what [`Encounters::start_sub_step`] gives it, and what grains carry; it
+    /// gives the length of the sub-step (s) and the strongest acceleration (m/s²).
+    pub(in crate::scheme) fn start_sub_step(
+        &mut self,
+        under: &Under,
+        kick: impl FnOnce(&S, &[Touch], &mut [Grain], &mut [Flight], &mut [Vector3<f64>]) -> (f64, f64),
+    ) {
+        self.force.under = *under;
+        let after = self.time - self.epoch_start;
+        self.natural_epoch(after);
+        self.force.acts = true;
+        let (grains, mut length, mut strongest) = (&mut self.grains, 0.0, 0.0);
+        self.encounters.start_sub_step(after, under.reach, |surface, touches, flights, accelerations| {
+            (length, strongest) = kick(surface, touches, grains, flights, accelerations);
+            length
+        });
+        self.force.resting_speed = STICKING * strongest * length;
+        let sticks = self.laws.grain.restitution < 1.0;
+        self.force.resting_speed_of_pairs = if sticks { strongest * length } else { self.force.resting_speed };
+        self.force.anchors.clear();
+        self.force.synchronised.clear();
+        if under.near_field.is_some() {
+            let slots = 0..self.grains.len() as u32;
+            self.force.anchors.extend(slots.map(|grain| self.encounters.flight(grain).position));
+        }
+        self.begin(after, length);
+    }
+
+    /// What contacts at rest did since it was last taken.
+    #[must_use]
+    pub fn held(&self) -> Held {
+        self.force.held
+    }
+
+    /// What contacts at rest did since this was last asked.
+    pub fn take_held(&mut self) -> Held {
+        std::mem::take(&mut self.force.held)
+    }
+
+    /// Mass of all grains (kg), their momentum beyond that of their chords at simulated time `time` (N s), and how far that is behind the middle
+    /// of the sub-step (s).
+    #[must_use]
+    pub fn lag(&self, time: f64) -> (f64, Vector3<f64>, f64) {
+        let now = time - self.epoch_start;
+        let of_grain = |grain: u32| {
+            let mass = self.grains[grain as usize].mass;
+            (mass, self.encounters.bend(grain).velocity(now) * mass)
+        };
+        let add = |sum: (f64, Vector3<f64>), one: (f64, Vector3<f64>)| (sum.0 + one.0, sum.1 + one.1);
+        let (mass, lag) = self.encounters.inside().map(of_grain).fold((0.0, Vector3::zeros()), add);
+        (mass, lag, if self.force.acts { now - 0.5 * self.epoch } else { 0.0 })
+    }
+
+    /// The near field has no finite value; its grains are counted over those inside.
+    #[must_use]
+    pub fn singular(&self, singular: &Singular) -> Broken {
+        let inside: Vec<u32> = self.encounters.inside().collect();
+        let id = |number: usize| self.grains[inside[number] as usize].id;
+        let grains = match *singular {
+            Singular::Coincident(a, b) => vec![id(a), id(b)],
+            Singular::NotFinite(grain) => vec![id(grain)],
+        };
+        Broken::Singular { time: self.time, grains }
+    }
+
+    /// What forces give to two grains during a contact of finite duration.
+    #[inline]
+    pub(super) fn external(&self, grains: [u32; 2]) -> External {
+        if self.force.under.contact_time == 0.0 {
+            return External::default();
+        }
+        let force = |grain: u32| self.encounters.bend(grain).acceleration * self.grains[grain as usize].mass;
+        External::new(grains.map(force), self.force.under.contact_time)
+    }
+
+    /// Gives two grains that touch the accelerations they have there: the near field between the two at contact, in place of that at the last
+    /// kick. The rest of the near field hardly changes within a sub-step.
+    #[inline]
+    pub(super) fn synchronise(&mut self, a: u32, b: u32) {
+        let Some(near_field) = self.force.under.near_field else { return };
+        let slots = self.force.anchors.len() as u32;
+        if a < slots && b < slots && self.force.synchronised.insert([a, b]) {
+            let [at_kick_a, at_kick_b] = [a, b].map(|grain| self.force.anchors[grain as usize]);
+            let now = self.true_flight(b).position - self.true_flight(a).position;
+            let strength = self.grains[a as usize].strength * self.grains[b as usize].strength;
+            let force = (near_field.force_on(self.domain.nearest(now))
+                - near_field.force_on(self.domain.nearest(at_kick_b - at_kick_a)))
+                * strength;
+            for (grain, force) in [(a, force), (b, -force)] {
+                self.encounters.pull(grain, force / self.grains[grain as usize].mass);
+            }
+        }
+    }
+
+    /// Two grains at rest against each other stay so until the end of the sub-step: what their chords approach is taken away by an impulse.
+    pub(super) fn hold_pair(
+        &mut self,
+        time: f64,
+        grains: [u32; 2],
+        bodies: [Body; 2],
+        normal: Vector3<f64>,
+        overlap_over_radius: f64,
+    ) -> Result<(), Broken> {
+        let ids = grains.map(|grain| self.grains[grain as usize].id);
+        let [first, second] = bodies;
+        let chords = grains.map(|grain| self.encounters.flight(grain).velocity);
+        // They part by a trifle, or their neighbours would press them together again without end.
+        let parting = YIELDING * first.radius.min(second.radius) / self.epoch;
+        let approach = ((chords[0] - chords[1]).dot(&normal) + parting).max(0.0);
+        let impulse = normal * (approach * first.mass * second.mass / (first.mass + second.mass));
+        let after = [first.velocity - impulse / first.mass, second.velocity + impulse / second.mass];
+        self.check(time, &ids, overlap_over_radius, &after)?;
+        self.force.held.dissipated_grain +=
+            impulse.dot(&(first.velocity - second.velocity + (after[0] - after[1]))) * 0.5;
+        self.force.held.contacts += 1;
+        self.deflect(&[(grains[0], after[0]), (grains[1], after[1])]);
+        Ok(())
+    }
+
+    /// Approach speed (m/s) below which a grain has come to rest against the surface.
+    pub(super) fn resting_speed_at_surface(&self, grain: u32) -> f64 {
+        let among_grains = self.rows.get(grain as usize).is_some_and(|row| row.among_grains());
+        if among_grains { self.force.resting_speed_of_pairs } else { self.force.resting_speed }
+    }
+
+    /// A grain at rest against the surface stays so until the end of the sub-step: the surface carries what pulls it there.
+    pub(super) fn hold_on_surface(
+        &mut self,
+        time: f64,
+        grain: u32,
+        before: &Body,
+        contact: &SurfaceContact,
+    ) -> Result<(), Broken> {
+        let id = self.grains[grain as usize].id;
+        let rate = (before.velocity - contact.velocity).dot(&contact.normal);
+        let after = before.velocity - contact.normal * rate.min(0.0);
+        self.check(time, &[id], -contact.gap / before.radius, &[after])?;
+        let chord = self.encounters.flight(grain).velocity;
+        let acceleration = self.encounters.bend(grain).acceleration;
+        let pull = acceleration.dot(&contact.normal).min(0.0);
+        self.encounters.accelerate(grain, acceleration - contact.normal * (pull * RELIEF));
+        self.deflect(&[(grain, after)]);
+        self.force.held.impulse_surface += (self.encounters.flight(grain).velocity - chord) * before.mass;
+        self.force.held.dissipated_surface +=
+            0.5 * before.mass * (before.velocity.norm_squared() - after.norm_squared());
+        self.force.held.contacts += 1;
+        Ok(())
+    }
+
+    /// The flight of a grain as it is at its local time: without forces the stored one.
+    #[inline]
+    pub(super) fn true_flight(&self, grain: u32) -> Flight {
+        let mut flight = *self.encounters.flight(grain);
+        if self.force.acts {
+            let bend = self.encounters.bend(grain);
+            flight.position += bend.offset(flight.time);
+            flight.velocity += bend.velocity(flight.time);
+        }
+        flight
+    }
+
+    /// Books what forces gave to a grain that goes (`sign` 1) or comes (-1) beyond the kick before.
+    pub(super) fn pass(&mut self, grain: u32, sign: f64) {
+        if self.force.acts {
+            let bend = self.encounters.bend(grain);
+            let mass = sign * self.grains[grain as usize].mass;
+            let lag = self.encounters.flight(grain).time - 0.5 * bend.step;
+            self.force.held.impulse_gravity += self.force.under.gravity * (mass * lag);
+            self.force.held.impulse_near_field += (bend.acceleration - self.force.under.gravity) * (mass * lag);
+        }
+    }
+}
+
+/// Kinetic energy, J.
+pub(super) fn energy(body: &Body) -> f64 {
+    0.5 * body.mass * (body.velocity.norm_squared() + 0.4 * body.radius.powi(2) * body.spin.norm_squared())
+}
