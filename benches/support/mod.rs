@@ -6,7 +6,7 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use cpu_time::ThreadTime;
+use cpu_time::ProcessTime;
 use criterion::Criterion;
 use impinge::scheme::{EventDriven, GrainCollision, Observer};
 use impinge_events::Surface;
@@ -62,7 +62,7 @@ pub fn duel(rounds: u32, mut first: impl FnMut() -> u64, mut second: impl FnMut(
         // Neither is always the one that finds the caches cold.
         let order = if round % 2 == 0 { [0, 1] } else { [1, 0] };
         for side in order {
-            let start = ThreadTime::now();
+            let start = ProcessTime::now();
             collisions[side] = if side == 0 { first() } else { second() };
             times[side].push(start.elapsed().as_secs_f64() * 1e6 / collisions[side] as f64);
         }
