@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 use crate::grains::NewGrain;
 use crate::law::{ContactLaw, Friction};
 use crate::law::{NearField, Term};
-use crate::near_field::{CutOff, ForceSum, Method};
+use crate::near_field::{Bound, CutOff, ForceSum, Method};
 use crate::scene::{Boundary, Interference, Invalid, Scene};
 use crate::scene::{Substep, Summation};
 use crate::scheme::{Broken, EventDriven, Forces, Laws, Length, Moments, Observer, Progress, Substepped};
@@ -267,6 +267,7 @@ fn forces(scene: &Scene, grains: u64) -> Result<Forces, Invalid> {
                 let skin = SKIN * radius;
                 Method::CutOff(CutOff { radius, switch_width: radius - switch, skin })
             }
+            (Summation::Tree, ..) => Method::Tree { tolerance: table.accuracy, bound: Bound::Proven },
             _ => Method::Direct,
         };
         ForceSum::new(law, method, &domain(scene)).map_err(|error| refuse(error.to_string()))

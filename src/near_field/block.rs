@@ -62,10 +62,30 @@ impl Block {
         with_radial!(law, radial => forces_within(radial, side));
     }
 
+    /// Adds the forces of all pairs of one grain in `one` and one in `other`: ranges of chunks that do not overlap.
+    pub(super) fn meet_within(&mut self, law: &NearField, one: Range<usize>, other: Range<usize>) {
+        let (lower, upper) = if one.start < other.start { (one, other) } else { (other, one) };
+        let (lower, upper) = self.two_sides(lower, upper);
+        with_radial!(law, radial => forces_between(radial, lower, upper));
+    }
+
     /// Adds the forces of all pairs of a grain of this block and one of `other`, in these ranges of chunks.
     pub(super) fn meet(&mut self, law: &NearField, own: Range<usize>, other: &mut Self, others: Range<usize>) {
         let (own, others) = (self.side(own), other.side(others));
         with_radial!(law, radial => forces_between(radial, own, others));
+    }
+
+    /// Force on grain `index` of `block` from the grains of this one, and the sum of the magnitudes of what contributes to it, both N.
+    /// `itself` says that both are the same block.
+    pub(super) fn force_on(&self, law: &NearField, block: &Self, index: usize, itself: bool) -> (Vector3<f64>, f64) {
+        let grain = block.grains(block.all()).get(index / LANES, index % LANES);
+        let skip = itself.then_some(index);
+        with_radial!(law, radial => force_and_magnitude(radial, grain, self.grains(self.all()), skip))
+    }
+
+    /// Takes all forces back.
+    pub(super) fn clear_forces(&mut self) {
+        self.forces.iter_mut().for_each(|axis| axis.fill([0.0; LANES]));
     }
 
     /// All chunks.
@@ -98,6 +118,20 @@ impl Block {
             forces: self.forces.each_mut().map(|axis| &mut axis[chunks.clone()]),
         }
     }
+
+    fn two_sides(&mut self, lower: Range<usize>, upper: Range<usize>) -> (Side<'_>, Side<'_>) {
+        let grains = |chunks: &Range<usize>| Grains {
+            places: self.places.each_ref().map(|axis| &axis[chunks.clone()]),
+            strengths: &self.strengths[chunks.clone()],
+        };
+        let grains = [grains(&lower), grains(&upper)];
+        let [x, y, z] = self.forces.each_mut().map(|axis| {
+            let (below, above) = axis.split_at_mut(upper.start);
+            (&mut below[lower.clone()], &mut above[..upper.len()])
+        });
+        let [lower, upper] = grains;
+        (Side { grains: lower, forces: [x.0, y.0, z.0] }, Side { grains: upper, forces: [x.1, y.1, z.1] })
+    }
 }
 
 /// Grains that are read.
@@ -129,7 +163,7 @@ impl Grains<'_> {
 
 /// Sum of all lanes, by halves.
 #[inline(always)]
-fn total(lanes: &Lanes) -> f64 {
+pub(super) fn total(lanes: &Lanes) -> f64 {
     let [a, b, c, d, e, f, g, h] = *lanes;
     ((a + e) + (c + g)) + ((b + f) + (d + h))
 }
@@ -210,6 +244,48 @@ fn forces_within<R: Radial>(radial: R, side: Side<'_>) {
                 forces[axis][chunk][lane] += total(&sums);
             }
         }
+    }
+}
+
+/// Force on a grain, and the sum of the magnitudes of what contributes to it, both N; the column `skip` is left out.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn force_and_magnitude<R: Radial>(
+    radial: R,
+    grain: ([f64; 3], f64),
+    others: Grains<'_>,
+    skip: Option<usize>,
+) -> (Vector3<f64>, f64) {
+    let mut pulls = [[[0.0; LANES]; PASS]; 3];
+    let mut magnitudes = [[0.0; LANES]; PASS];
+    let mut sums = [[0.0; LANES]; 4];
+    for start in (0..others.strengths.len()).step_by(PASS) {
+        let columns = others.from(start);
+        let count = columns.strengths.len().min(PASS);
+        pull(radial, grain, columns, &mut pulls);
+        weigh(radial, grain, columns, &mut magnitudes);
+        for (pass, sum) in pulls.iter_mut().chain([&mut magnitudes]).zip(&mut sums) {
+            let pass = &mut pass[..count];
+            let own = skip.and_then(|skip| pass.as_flattened_mut().get_mut(skip.wrapping_sub(start * LANES)));
+            own.into_iter().for_each(|own| *own = 0.0);
+            add_up(pass, sum);
+        }
+    }
+    let [x, y, z, magnitude] = sums.map(|sum| total(&sum));
+    (Vector3::new(x, y, z), magnitude)
+}
+
+/// Sums of the magnitudes of both terms of the law between a grain and grains at `others`, N.
+#[inline(always)]
+fn weigh<R: Radial>(radial: R, (place, strength): ([f64; 3], f64), others: Grains<'_>, magnitudes: &mut Pass) {
+    let count = others.strengths.len().min(PASS) * LANES;
+    let [x, y, z] = others.places.map(|axis| &axis.as_flattened()[..count]);
+    let strengths = &others.strengths.as_flattened()[..count];
+    let magnitudes = &mut magnitudes.as_flattened_mut()[..count];
+    for index in 0..count {
+        let apart = [x[index] - place[0], y[index] - place[1], z[index] - place[2]];
+        let r2 = apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2];
+        let weight = (strength * strengths[index]).abs();
+        magnitudes[index] = weight * NearField::magnitude_at(radial, r2) * r2.sqrt();
     }
 }
 

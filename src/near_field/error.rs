@@ -20,6 +20,9 @@ pub enum Unsuitable {
         /// Half the shortest side, m.
         half: f64,
     },
+    /// A tolerance that nothing can meet, or that would let everything pass.
+    #[error("the tolerance of the tree must be between {} and {}, not {}", super::TIGHTEST, super::LOOSEST, .0)]
+    Tolerance(f64),
 }
 
 /// Grains between which there is no finite force.

@@ -29,6 +29,7 @@ mod direct;
 mod error;
 mod measure;
 mod tournament;
+mod tree;
 
 use impinge_events::Domain;
 use nalgebra::Vector3;
@@ -38,7 +39,14 @@ use self::cut_off::CutOffSum;
 use self::direct::Direct;
 pub use self::error::{Singular, Unsuitable};
 pub use self::measure::MeasuredError;
+use self::tree::TreeSum;
 use crate::law::NearField;
+
+/// The tightest tolerance of a tree: below it, rounding would no longer be small beside it.
+pub const TIGHTEST: f64 = 1e-8;
+
+/// The loosest tolerance of a tree: beyond it, forces would be guesses.
+pub const LOOSEST: f64 = 0.1;
 
 /// How the near field is summed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,6 +55,47 @@ pub enum Method {
     Direct,
     /// Pairs within a cut-off.
     CutOff(CutOff),
+    /// All pairs, those of distant groups of grains together.
+    Tree {
+        /// Bound of the error of the force on each grain i, over the sum of the magnitudes of all contributions to it,
+        /// Σ_j |s_i s_j| (|alpha1| r_ij^-beta1 + |alpha2| r_ij^-beta2). Relative to the force itself the error is larger: contributions cancel.
+        tolerance: f64,
+        /// What stands behind the tolerance.
+        bound: Bound,
+    },
+}
+
+/// What stands behind the tolerance of a tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bound {
+    /// A proof, for each grain of any set. It supposes the worst of all cells: real errors stay hundreds of times below the
+    /// tolerance, and it takes up to a few times as long.
+    Proven,
+    /// A measurement: each sum is compared with the direct sum at 64 grains, and if an error there is above a quarter of the tolerance it is
+    /// worked out anew with cells further apart, in the end as with [`Proven`](Self::Proven). An error above the tolerance that the
+    /// sample does not show is unlikely, but not excluded.
+    Measured,
+}
+
+/// Grains from which on a tree is faster than the direct sum, at tolerances about 1e-4 (`cargo bench --bench near_field`).
+const TREE_FROM: usize = 3000;
+
+/// The faster way to sum all pairs of so many grains with at most this error: the direct sum, or a tree with a proven bound.
+///
+/// ```
+/// use impinge::near_field::{Bound, Method, choose};
+///
+/// assert_eq!(choose(500, 1e-4), Method::Direct);
+/// assert_eq!(choose(100_000, 1e-4), Method::Tree { tolerance: 1e-4, bound: Bound::Proven });
+/// assert_eq!(choose(100_000, 1e-12), Method::Direct, "no tree is as good as that");
+/// ```
+#[must_use]
+pub fn choose(grains: usize, tolerance: f64) -> Method {
+    if grains < TREE_FROM || tolerance < TIGHTEST {
+        Method::Direct
+    } else {
+        Method::Tree { tolerance: tolerance.min(LOOSEST), bound: Bound::Proven }
+    }
 }
 
 /// The near field of many grains, and whatever its sum keeps from one time to the next.
@@ -61,6 +110,7 @@ pub struct ForceSum {
 enum Way {
     Direct(Direct),
     CutOff(Box<CutOffSum>),
+    Tree(Box<TreeSum>),
 }
 
 impl ForceSum {
@@ -76,6 +126,10 @@ impl ForceSum {
         let way = match method {
             Method::Direct => Way::Direct(Direct::default()),
             Method::CutOff(cut_off) => Way::CutOff(Box::new(CutOffSum::new(&law, cut_off, domain)?)),
+            Method::Tree { tolerance, .. } if !(TIGHTEST..=LOOSEST).contains(&tolerance) => {
+                return Err(Unsuitable::Tolerance(tolerance));
+            }
+            Method::Tree { tolerance, bound } => Way::Tree(Box::new(TreeSum::new(&law, tolerance, bound))),
         };
         Ok(Self { law, method, way })
     }
@@ -112,6 +166,7 @@ impl ForceSum {
         match &mut self.way {
             Way::Direct(sum) => sum.forces(&self.law, positions, strengths, out),
             Way::CutOff(sum) => sum.forces(&self.law, positions, strengths, out),
+            Way::Tree(sum) => sum.forces(&self.law, positions, strengths, out),
         }
         match out.iter().position(|force| !is_finite(force)) {
             Some(grain) => Err(self.singular(positions, grain)),
@@ -133,6 +188,7 @@ impl ForceSum {
         let energy = match &mut self.way {
             Way::Direct(sum) => sum.potential_energy(&self.law, positions, strengths),
             Way::CutOff(sum) => sum.potential_energy(&self.law, positions, strengths),
+            Way::Tree(sum) => sum.potential_energy(&self.law, positions, strengths),
         };
         if energy.is_finite() {
             return Ok(energy);
@@ -157,7 +213,7 @@ impl ForceSum {
     #[must_use]
     pub fn pair_force(&self, apart: Vector3<f64>) -> Vector3<f64> {
         match &self.way {
-            Way::Direct(_) => self.law.force_on(apart),
+            Way::Direct(_) | Way::Tree(_) => self.law.force_on(apart),
             Way::CutOff(sum) => sum.pair_force(&self.law, apart),
         }
     }
@@ -166,7 +222,7 @@ impl ForceSum {
     #[must_use]
     pub fn pair_potential(&self, r: f64) -> f64 {
         match &self.way {
-            Way::Direct(_) => self.law.potential(r),
+            Way::Direct(_) | Way::Tree(_) => self.law.potential(r),
             Way::CutOff(sum) => sum.pair_potential(&self.law, r),
         }
     }
@@ -176,7 +232,7 @@ impl ForceSum {
     pub fn lists_made(&self) -> u64 {
         match &self.way {
             Way::CutOff(sum) => sum.lists_made(),
-            Way::Direct(_) => 0,
+            Way::Direct(_) | Way::Tree(_) => 0,
         }
     }
 

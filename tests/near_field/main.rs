@@ -7,6 +7,7 @@ mod cut_off;
 mod direct;
 mod law;
 mod sets;
+mod tree;
 
 use impinge::law::NearField;
 use impinge::near_field::{ForceSum, Method};
