@@ -37,7 +37,14 @@ fn cloud(count: u32) -> (Vec<NewGrain>, Domain) {
         let place = Vector3::new(number % cells, number / cells % cells, number / cells / cells).map(f64::from);
         let mut shaken = |size: f64| Vector3::from_fn(|_, _| random.random_range(-size..size));
         let position = (place.add_scalar(0.5) + shaken(0.15)) * side;
-        NewGrain { position, velocity: shaken(1.0), spin: Vector3::zeros(), radius: RADIUS, density: 2500.0, strength: 1.0 }
+        NewGrain {
+            position,
+            velocity: shaken(1.0),
+            spin: Vector3::zeros(),
+            radius: RADIUS,
+            density: 2500.0,
+            strength: 1.0,
+        }
     });
     let max = Vector3::repeat(f64::from(cells) * side);
     (grains.collect(), Domain { min: Vector3::zeros(), max, periodic: true, planar: false })
@@ -91,9 +98,17 @@ fn substep(_: &mut Criterion) {
     let scenes: &[(&str, u32, Method, bool)] = if trial() {
         &[("direct", 64, Method::Direct, false), ("cut-off", 1000, cut_off, true)]
     } else {
-        &[("direct", 500, Method::Direct, false), ("direct", 2000, Method::Direct, false), ("cut-off", 8000, cut_off, true), ("cut-off", 64_000, cut_off, true)]
+        &[
+            ("direct", 500, Method::Direct, false),
+            ("direct", 2000, Method::Direct, false),
+            ("cut-off", 8000, cut_off, true),
+            ("cut-off", 64_000, cut_off, true),
+        ]
     };
-    eprintln!("\n{:28} {:>12} {:>12} {:>11} {:>24}", "CPU time of a sub-step", "bare sum", "sub-step", "ratio", "colliding in a sub-step");
+    eprintln!(
+        "\n{:28} {:>12} {:>12} {:>11} {:>24}",
+        "CPU time of a sub-step", "bare sum", "sub-step", "ratio", "colliding in a sub-step"
+    );
     for &(way, count, method, periodic) in scenes {
         let (Duel { microseconds: [bare, whole], ratio, .. }, colliding) = against_sum(count, method, periodic);
         let name = format!("{way}, {count} grains");

@@ -12,7 +12,7 @@ use crate::law::{NearField, Term};
 use crate::near_field::{Bound, CutOff, ForceSum, Method};
 use crate::scene::{Boundary, Interference, Invalid, Scene};
 use crate::scene::{Substep, Summation};
-use crate::scheme::{Broken, EventDriven, Forces, Laws, Length, Moments, Observer, Progress, Substepped};
+use crate::scheme::{Broken, EventDriven, Forces, Laws, Length, Moments, Observer, Progress, SubSteps, Substepped};
 use crate::source::{self, Nozzle};
 use crate::surface::Surface;
 
@@ -143,6 +143,17 @@ impl Simulation {
     #[must_use]
     pub fn counts(&self) -> &[usize] {
         &self.counts
+    }
+
+    /// How the sub-steps went; none where no force acts.
+    ///
+    /// # Errors
+    /// Grains between which there is no finite force.
+    pub fn sub_steps(&mut self) -> Result<Option<SubSteps>, Broken> {
+        match &mut self.scheme {
+            Advance::Freely(_) => Ok(None),
+            Advance::UnderForces(scheme) => scheme.report().map(Some),
+        }
     }
 
     /// The nozzles, with what they have sent and deferred so far.

@@ -12,7 +12,7 @@ use super::{Error, EventTable, Folder, Summary, vtk};
 use crate::grains::{Grain, Snapshot};
 use crate::observe::{History, Ledger, SurfaceEnergy, SurfaceMap, SurfaceShape};
 use crate::scene::{Radius, Scene};
-use crate::scheme::{GrainCollision, Kick, Observer, Passage, Rest, SurfaceHit};
+use crate::scheme::{GrainCollision, Kick, Observer, Passage, Rest, SubSteps, SurfaceHit};
 
 /// What the observers of a run cannot know.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -21,6 +21,8 @@ pub struct Outcome {
     pub interrupted: bool,
     /// Entries that had to wait because the place was taken.
     pub entries_deferred: u64,
+    /// How the sub-steps went, where forces act.
+    pub sub_steps: Option<SubSteps>,
     /// Time of the processor, s.
     pub cpu_seconds: f64,
     /// Time on the clock, s.

@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::Outcome;
 use crate::observe::{Ledger, SurfaceEnergy};
 use crate::scene::{Interference, Scene, Scheme};
+use crate::scheme::SubSteps;
 
 /// Hit orders listed in the summary; `surface_hits.csv` has them all.
 const LISTED_ORDERS: usize = 20;
@@ -46,6 +47,9 @@ pub struct Summary {
     pub momentum_residual: f64,
     /// Where the mass went.
     pub mass: Mass,
+    /// How the sub-steps went; absent where no force acts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sub_steps: Option<SubStepping>,
     /// Deepest overlap at any event, over the smaller radius.
     pub max_overlap_over_radius: f64,
     /// Time of the processor, s.
@@ -202,6 +206,47 @@ pub struct Momentum {
     pub gravity: Option<[f64; 3]>,
 }
 
+/// How the sub-steps of a run with forces went.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SubStepping {
+    /// How many there were.
+    pub count: u64,
+    /// Length of the last one, s.
+    pub length: f64,
+    /// Contacts at rest at the end.
+    pub resting_contacts: u32,
+    /// Largest error of the near field at the grains that were looked at, over the sum of the magnitudes of what contributes to the force.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_error_of_contributions: Option<f64>,
+    /// The same over the force itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_error_of_force: Option<f64>,
+}
+
+impl SubStepping {
+    fn new(sub_steps: &SubSteps) -> Self {
+        Self {
+            count: sub_steps.count,
+            length: sub_steps.length,
+            resting_contacts: sub_steps.resting_contacts,
+            force_error_of_contributions: sub_steps.near_field_error.map(|error| error.of_contributions),
+            force_error_of_force: sub_steps.near_field_error.map(|error| error.of_force),
+        }
+    }
+
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(error) = self.force_error_of_force {
+            writeln!(f, "  {:<26}{:>12} of the force", "near field", format!("{error:.1e}"))?;
+        }
+        let (count, length) = (grouped(self.count), quantity(self.length, "s"));
+        writeln!(
+            f,
+            "\n{count} sub-steps, the last of {length}; {} contacts at rest at the end",
+            grouped(self.resting_contacts.into())
+        )
+    }
+}
+
 /// Where the mass went, kg.
 #[derive(Clone, Debug, Serialize)]
 pub struct Mass {
@@ -287,6 +332,7 @@ impl Summary {
                 final_: inside.mass(),
                 residual: ledger.mass_residual(),
             },
+            sub_steps: outcome.sub_steps.as_ref().map(SubStepping::new),
             max_overlap_over_radius: ledger.max_overlap_over_radius(),
             cpu_seconds: outcome.cpu_seconds,
             wall_seconds: outcome.wall_seconds,
@@ -413,6 +459,9 @@ impl Summary {
         writeln!(f, "  {:<26}{:>12} of {scale}", "energy", small(self.energy.residual_relative))?;
         writeln!(f, "  {:<26}{:>12} of the sum of m |v|", "momentum", small(self.momentum_residual))?;
         writeln!(f, "  {:<26}{:>12} of the radius", "deepest overlap", small(self.max_overlap_over_radius))?;
+        if let Some(sub_steps) = &self.sub_steps {
+            sub_steps.fmt(f)?;
+        }
         let [cpu, wall] = [self.cpu_seconds, self.wall_seconds].map(|seconds| quantity(seconds, "s"));
         write!(f, "\n{cpu} of processor time in {wall}")?;
         let collisions = self.collisions.grain_grain + self.collisions.grain_surface;

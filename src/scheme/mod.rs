@@ -6,7 +6,7 @@ mod substep;
 mod timetable;
 
 pub use event_driven::{EventDriven, Held, LARGEST_OVERLAP, LARGEST_OVERLAP_WITH_FORCES, Laws};
-pub use substep::{Forces, Length, STEPS_PER_CHECK, Substepped};
+pub use substep::{Forces, Length, STEPS_PER_CHECK, SubSteps, Substepped};
 pub use timetable::Moments;
 
 use impinge_events::Flight;

@@ -16,7 +16,7 @@ use super::event_driven::{Held, Under};
 use super::resting::Resting;
 use super::{Broken, EventDriven, Kick, Laws, Observer, Passage, Progress, Rest};
 use crate::grains::{Grain, NewGrain, kinetic_energy};
-use crate::near_field::{ForceSum, Singular};
+use crate::near_field::{ForceSum, MeasuredError, Singular};
 
 /// What acts on grains between events.
 #[derive(Clone, Debug)]
@@ -28,6 +28,22 @@ pub struct Forces {
     /// How long a contact lasts for the impulse that forces give to it, s; 0 where contacts are instantaneous.
     pub contact_time: f64,
 }
+
+/// How the sub-steps of a run went.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SubSteps {
+    /// How many there were.
+    pub count: u64,
+    /// Length of the last one, s.
+    pub length: f64,
+    /// Contacts at rest at the end.
+    pub resting_contacts: u32,
+    /// The true error of the near field at the end, where there is one.
+    pub near_field_error: Option<MeasuredError>,
+}
+
+/// Grains at which the error of the near field is measured.
+const SAMPLE: usize = 100;
 
 /// How long sub-steps are.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -442,6 +458,23 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
     #[must_use]
     pub fn engine(&self) -> &EventDriven<S, C> {
         &self.engine
+    }
+
+    /// How the sub-steps went, with the true error of the near field at some grains as they are now.
+    ///
+    /// # Errors
+    /// Grains between which there is no finite force.
+    pub fn report(&mut self) -> Result<SubSteps, Broken> {
+        let Self { engine, forces, .. } = self;
+        let measured = forces.near_field.as_mut().map(|near_field| {
+            engine.snapshot(engine.time(), |snapshot| {
+                let places: Vec<_> = snapshot.flights.iter().map(|flight| flight.position).collect();
+                let strengths: Vec<_> = snapshot.grains.iter().map(|grain| grain.strength).collect();
+                near_field.measured_error(&places, Some(&strengths), SAMPLE)
+            })
+        });
+        let near_field_error = measured.transpose().map_err(|singular| self.engine.singular(&singular))?;
+        Ok(SubSteps { count: self.steps, length: self.step, resting_contacts: self.resting.count(), near_field_error })
     }
 
     /// Sub-steps so far.
