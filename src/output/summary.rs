@@ -478,7 +478,8 @@ impl Summary {
     }
 
     fn energy_line(&self, f: &mut fmt::Formatter<'_>, name: &str, energy: f64, note: &str) -> fmt::Result {
-        let total = self.brought_in();
+        // Where forces act most of the energy may come from them, and E0 is no measure.
+        let total = if self.energy.forces.is_some() { 0.0 } else { self.brought_in() };
         let part = if total > 0.0 { format!("{:>8.2} %", 100.0 * energy / total) } else { String::new() };
         writeln!(f, "  {name:<26}{:>12}{part}{note}", quantity(energy, "J"))
     }

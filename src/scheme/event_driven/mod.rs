@@ -42,7 +42,7 @@ const JAM_TIME: f64 = 1.0 / (1u64 << 20) as f64;
 pub const LARGEST_OVERLAP_WITH_FORCES: f64 = 1e-3;
 /// Speed over that of the fastest grain below which a sequence of hits has collapsed.
 const COLLAPSED: f64 = 1e-9;
-/// The law of a contact in a collapse.
+/// The law of a contact in a collapse where no force acts.
 const ELASTIC: ContactLaw = ContactLaw { restitution: 1.0, friction: Friction::Smooth };
 /// Encounters between two looks at the watch (progress, Ctrl-C).
 const ENCOUNTERS_PER_WATCH: u32 = 4096;
@@ -276,6 +276,11 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.rows.get_mut(grain as usize).is_some_and(|row| row.note(time, within, partner, approach, in_line))
     }
 
+    /// The law of a contact in a collapse: elastic where grains fly apart after it, plastic where forces press them together until they rest.
+    fn law_in_collapse(&self, law: &ContactLaw) -> ContactLaw {
+        if self.force.acts { ContactLaw { restitution: 0.0, ..*law } } else { ELASTIC }
+    }
+
     /// Two grains touch.
     fn collide(&mut self, time: f64, a: u32, b: u32, observer: &mut impl Observer) -> Result<(), Broken> {
         // The lower id is the first of the two: slots are used again, ids are not.
@@ -307,8 +312,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         // Both rows go on, whatever the first says.
         let approach = contact.approach_speed;
         if self.is_collapsing(time, a, b, approach) | self.is_collapsing(time, b, a, approach) {
-            withheld = contact.impulse.dissipated;
-            contact = resolve_pair_under(&ELASTIC, &first, &second, normal, &external);
+            let lawful = contact.impulse.dissipated;
+            contact = resolve_pair_under(&self.law_in_collapse(&self.laws.grain), &first, &second, normal, &external);
+            withheld = (lawful - contact.impulse.dissipated).max(0.0);
         }
         // Where rounding has turned the slightest graze into none, both fly on.
         if contact.impulse.normal == 0.0 {
@@ -365,8 +371,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             resolve_surface_under(&self.laws.surface, &before, contact.normal, contact.velocity, external);
         let mut withheld = 0.0;
         if self.is_collapsing(time, grain, SURFACE, resolved.approach_speed) {
-            withheld = resolved.impulse.dissipated;
-            resolved = resolve_surface_under(&ELASTIC, &before, contact.normal, contact.velocity, external);
+            let (lawful, law) = (resolved.impulse.dissipated, self.law_in_collapse(&self.laws.surface));
+            resolved = resolve_surface_under(&law, &before, contact.normal, contact.velocity, external);
+            withheld = (lawful - resolved.impulse.dissipated).max(0.0);
         }
         if self.force.under.contact_time > 0.0 {
             resolved.after.velocity -= external / before.mass;
