@@ -1,6 +1,6 @@
 //! Sums of the near field: pairs a second of the direct sum, the tree against it and over the number of grains, and sums within a cut-off.
 //!
-//! `cargo bench --bench near_field`; everything runs in one thread. CPU times and ratios, measured in turns, come at the end.
+//! `cargo bench --bench near_field`; everything runs in one thread. CPU times and ratios, measured in turns, come after each part.
 
 mod support;
 

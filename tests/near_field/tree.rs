@@ -146,6 +146,20 @@ fn sets_of_any_size_are_within_the_tolerance() {
     assert_eq!(forces(&mut sum, &[Vector3::zeros(), apart], None), [law.force_on(apart), law.force_on(-apart)]);
 }
 
+/// Cells without any strength once made all others too close.
+#[test]
+fn grains_of_no_strength_do_not_disturb() {
+    let positions = clusters(3000, 17);
+    let strengths: Vec<f64> = positions.iter().map(|place| f64::from(u8::from(place.x > 0.0))).collect();
+    for bound in [Bound::Proven, Bound::Measured] {
+        let error = largest_error([2.0, 3.0], 1e-4, bound, &positions, Some(&strengths));
+        assert!(error.of_contributions > ROUNDING, "nothing was expanded");
+    }
+    let none = vec![0.0; 3000];
+    let mut sum = tree(2.0, 3.0, 1e-4, Bound::Proven);
+    assert!(forces(&mut sum, &positions, Some(&none)).iter().all(|force| *force == Vector3::zeros()));
+}
+
 /// The same forces, wherever the set is, but for the rounding of the places.
 #[test]
 fn a_set_may_be_far_from_the_origin() {

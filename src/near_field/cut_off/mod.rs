@@ -61,8 +61,13 @@ impl CutOffSum {
         if domain.periodic && radius > 0.5 * shortest {
             return Err(Unsuitable::LongCutOff { radius, half: 0.5 * shortest });
         }
-        let list = NeighborList::new(&[], domain, radius + skin);
-        Ok(Self { cut_off, switch: Switch::new(law, cut_off), domain: *domain, list, lists_made: 0 })
+        Ok(Self {
+            cut_off,
+            switch: Switch::new(law, cut_off),
+            domain: *domain,
+            list: NeighborList::default(),
+            lists_made: 0,
+        })
     }
 
     /// How often lists were made.
@@ -163,8 +168,9 @@ fn forces<R: Radial>(radial: R, grains: Grains<'_>, list: &NeighborList, first: 
         for neighbors in list.of(grain).chunks(PASS) {
             gather(grains, grain, neighbors, &mut apart, &mut weights);
             pull(radial, grains.period, &mut apart, &weights, neighbors.len());
-            for index in 0..neighbors.len() {
-                *out += Vector3::from(apart.map(|axis| axis[index]));
+            let [x, y, z] = &apart;
+            for ((x, y), z) in x.iter().zip(y).zip(z).take(neighbors.len()) {
+                *out += Vector3::new(*x, *y, *z);
             }
         }
     }

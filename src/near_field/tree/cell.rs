@@ -35,7 +35,7 @@ pub(super) struct Cell {
     pub(super) radius: f64,
     /// Sum of the magnitudes of the strengths.
     pub(super) weight: f64,
-    /// Means of the powers of the distances from the centre, weighted with the strengths, m^k.
+    /// Means of the powers of the distances from the centre, weighted with the strengths, m^k; 0 without any strength.
     pub(super) spreads: [f64; MAX_ORDER + 1],
     /// The least, over the grains in the cell and per unit of their strength, of the sums of the magnitudes of the contributions of all grains
     /// of the set, over the sum of the magnitudes of all strengths, N; a lower bound.
@@ -59,7 +59,9 @@ impl Cell {
             }
         }
         let weight = spreads[0];
-        spreads.iter_mut().for_each(|spread| *spread /= weight);
+        if weight > 0.0 {
+            spreads.iter_mut().for_each(|spread| *spread /= weight);
+        }
         let chunks = first..first + grains.len().div_ceil(LANES);
         Self { chunks, children: None, centre, radius, weight, spreads, mean_contribution: 0.0 }
     }
