@@ -613,7 +613,17 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         let (flight, plan) = (self.flights[grain as usize], &self.plans[grain as usize]);
         let until = plan.pair.time.min(plan.side.time).min(self.horizon);
         let under_force = !self.accelerations.is_empty();
-        Search { grain, flight, until, under_force, flights: &self.flights, plans: &self.plans, best: plan.pair, looks: 0 }
+        Search {
+            grain,
+            flight,
+            until,
+            under_force,
+            horizon: self.horizon,
+            flights: &self.flights,
+            plans: &self.plans,
+            best: plan.pair,
+            looks: 0,
+        }
     }
 
     /// Puts a meeting into the plans of both grains, and leaves the one that `grain` or its new partner had in mind before.
@@ -681,6 +691,8 @@ struct Search<'a> {
     until: f64,
     /// Whether grains press against each other.
     under_force: bool,
+    /// End of the sub-step, s.
+    horizon: f64,
     flights: &'a [Flight],
     plans: &'a [Plan],
     /// The best so far.
@@ -702,7 +714,7 @@ impl Search<'_> {
         }
         let met = if self.under_force {
             let slack = YIELDING * self.flight.radius.min(theirs.radius);
-            sphere_sphere_yielding(&self.flight, theirs, shift, slack)
+            sphere_sphere_yielding(&self.flight, theirs, shift, slack, self.horizon)
         } else {
             sphere_sphere(&self.flight, theirs, shift)
         };
