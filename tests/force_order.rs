@@ -3,20 +3,13 @@
 
 mod common;
 
-use common::forced::{Scene, attraction, floor, mesh_floor, orders, states};
+use common::forced::{Scene, attraction, floor, mesh_floor, orders, rough, states};
 use common::{grain, smooth};
 use impinge::grains::{Grain, NewGrain};
-use impinge::law::{ContactLaw, Friction, NearField};
-use impinge::scene::Interference;
-use impinge::scheme::{Collapse, Laws};
+use impinge::law::NearField;
+use impinge::scheme::{Laws, Length};
 use impinge_events::{Domain, Encounter, Encounters, Flight, NoSurface};
 use nalgebra::Vector3;
-
-/// The same restitution and friction everywhere.
-fn rough(restitution: f64, mu: f64) -> Laws {
-    let law = ContactLaw { restitution, friction: Friction::Coulomb { static_: mu, dynamic: mu } };
-    Laws { grain: law, surface: law, interference: Interference::All, collapse: Collapse::Elastic }
-}
 
 /// Fails where an order of positions or velocities is further than `tolerance` from `expected`. The scene must have collided a few times.
 fn assert_order(what: &str, found: [f64; 2], expected: f64, tolerance: f64) {
@@ -51,7 +44,7 @@ fn two_grains_in_a_line() {
 /// collide.
 fn plain_split(scene: &Scene, step: f64, until: f64) -> Vec<(Flight, Grain)> {
     let near_field = scene.near_field.expect("a near field");
-    let start: Vec<_> = states(&scene.start(impinge::scheme::Length::Fixed(step)), 0.0);
+    let start: Vec<_> = states(&scene.start(Length::Fixed(step)), 0.0);
     let flights = start.iter().map(|(flight, _)| *flight).collect();
     let [mass, other_mass] = [start[0].1.mass, start[1].1.mass];
     let mut grains: Encounters = Encounters::new(flights, NoSurface, Domain::unbounded());

@@ -3,16 +3,17 @@
 use std::ops::ControlFlow;
 
 use impinge::grains::{Grain, NewGrain};
-use impinge::law::{NearField, Term};
+use impinge::law::{ContactLaw, Friction, NearField, Term};
 use impinge::near_field::{ForceSum, Method};
 use impinge::observe::Ledger;
-use impinge::scene::{self, PlaneSurface, RectangleSurface};
-use impinge::scheme::{EventDriven, Forces, Laws, Length, Observer, Substepped};
+use impinge::scene::{self, Interference, PlaneSurface, RectangleSurface};
+use impinge::scheme::{Collapse, EventDriven, Forces, Laws, Length, Observer, Substepped};
 use impinge::surface::Surface;
 use impinge_events::{Domain, Flight};
 use nalgebra::Vector3;
+use rand::{RngExt as _, SeedableRng as _};
 
-use super::{Log, smooth};
+use super::{Log, grain, smooth};
 
 /// Grains under forces.
 #[derive(Clone, Debug)]
@@ -90,6 +91,26 @@ pub fn states(run: &Substepped<Surface>, time: f64) -> Vec<(Flight, Grain)> {
 pub fn attraction(strength: f64) -> NearField {
     let term = |alpha, beta| Term { alpha: alpha * strength, beta };
     NearField::new(term(1.0, 2.0), term(0.5, 3.0)).expect("a law")
+}
+
+/// The same restitution and friction everywhere.
+pub fn rough(restitution: f64, mu: f64) -> Laws {
+    let law = ContactLaw { restitution, friction: Friction::Coulomb { static_: mu, dynamic: mu } };
+    Laws { grain: law, surface: law, interference: Interference::All, collapse: Collapse::Elastic }
+}
+
+/// Side³ grains of radius `radius` (m) and 1 kg on a lattice of `pitch` (m) about the origin, a little off their places, at speeds of up to `speed`
+/// (m/s) along each axis.
+pub fn block(side: u32, radius: f64, pitch: f64, speed: f64) -> Vec<NewGrain> {
+    let mut random = rand_pcg::Pcg64::seed_from_u64(20);
+    let mut within = |most: f64| Vector3::from_fn(|_, _| random.random_range(-1.0..1.0) * most);
+    (0..side.pow(3))
+        .map(|cell| {
+            let place = Vector3::new(cell % side, cell / side % side, cell / side.pow(2)).map(f64::from);
+            let place = place.add_scalar(0.5 - 0.5 * f64::from(side)) * pitch;
+            grain(place + within(0.1 * (pitch - 2.0 * radius)), within(speed), radius, 1.0)
+        })
+        .collect()
 }
 
 /// The plane z = 0, hit from above.
