@@ -138,7 +138,9 @@ pub struct Encounters<S: Surface = NoSurface, C: Calendar = Tournament> {
     vacant: Vec<u32>,
     /// End of the epoch: nothing beyond it is scheduled.
     horizon: f64,
-    /// Accelerations of the grains, m/s²; empty where none acts. Then the flights are chords ([`Bend`]) and the epoch is a sub-step.
+    /// Whether forces act. Then the flights are chords ([`Bend`]) and the epoch is a sub-step.
+    under_force: bool,
+    /// Accelerations of the grains, m/s²; empty where no force acts.
     accelerations: Vec<Vector3<f64>>,
     /// Cells crossed since their layout was last thought over.
     crossings: usize,
@@ -180,6 +182,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             domain,
             vacant: Vec::new(),
             horizon: f64::INFINITY,
+            under_force: false,
             accelerations: Vec::new(),
             crossings: 0,
             looks: 0,
@@ -296,7 +299,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     ///
     /// It is accelerated at `acceleration` (m/s²) until the next sub-step, if there are such.
     pub fn insert(&mut self, mut flight: Flight, acceleration: Vector3<f64>) -> u32 {
-        if !self.accelerations.is_empty() {
+        if self.under_force {
             let bend = Bend { acceleration, step: self.horizon };
             flight.position -= bend.offset(flight.time);
             flight.velocity -= bend.velocity(flight.time);
@@ -305,7 +308,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         if grain as usize == self.flights.len() {
             self.flights.push(flight);
             self.plans.push(NO_PLAN);
-            if !self.accelerations.is_empty() {
+            if self.under_force {
                 self.accelerations.push(acceleration);
             }
         } else {
@@ -382,6 +385,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         kick: impl FnOnce(&S, &[Touch], &mut [Flight], &mut [Vector3<f64>]) -> f64,
     ) {
         self.halt(duration);
+        self.under_force = true;
         self.accelerations.resize(self.flights.len(), Vector3::zeros());
         let touches = self.touches(reach);
         let next = kick(&self.surface, &touches, &mut self.flights, &mut self.accelerations);
@@ -454,7 +458,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
 
     /// Makes neighbour lists for the coming sub-steps, where there are such and it pays.
     fn make_lists(&mut self) -> bool {
-        if self.accelerations.is_empty() {
+        if !self.under_force {
             return false;
         }
         let (flights, largest) = self.flights_and_largest_radius();
@@ -612,12 +616,11 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     fn search(&self, grain: u32) -> Search<'_> {
         let (flight, plan) = (self.flights[grain as usize], &self.plans[grain as usize]);
         let until = plan.pair.time.min(plan.side.time).min(self.horizon);
-        let under_force = !self.accelerations.is_empty();
         Search {
             grain,
             flight,
             until,
-            under_force,
+            under_force: self.under_force,
             horizon: self.horizon,
             flights: &self.flights,
             plans: &self.plans,
