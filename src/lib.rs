@@ -29,6 +29,7 @@ pub mod scene;
 pub mod scheme;
 pub mod simulation;
 pub mod source;
+mod sum;
 pub mod surface;
 
 /// The program in README.md runs too.

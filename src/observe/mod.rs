@@ -20,13 +20,13 @@ pub(crate) mod fake_jet;
 mod forces;
 mod history;
 mod ledger;
-mod sum;
 mod surface_energy;
 mod surface_map;
 
 pub use forces::Forces;
 pub use history::{History, Moment};
 pub use ledger::{Amounts, Counts, Ledger};
-pub use sum::{Sum, VectorSum};
 pub use surface_energy::{OrderTally, SurfaceEnergy};
 pub use surface_map::{PlaneMap, PlaneShape, SurfaceMap, SurfaceShape, Tally, TriangleShape};
+
+pub use crate::sum::{Sum, VectorSum};

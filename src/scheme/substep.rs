@@ -17,6 +17,7 @@ use super::resting::Resting;
 use super::{Broken, EventDriven, Kick, Laws, Observer, Passage, Progress, Rest};
 use crate::grains::{Grain, NewGrain, kinetic_energy};
 use crate::near_field::{ForceSum, MeasuredError, Singular};
+use crate::sum::{Sum, VectorSum};
 
 /// What acts on grains between events.
 #[derive(Clone, Debug)]
@@ -152,17 +153,17 @@ impl Start {
     }
 }
 
-/// What forces and contacts at rest did, in all.
+/// What forces and contacts at rest did, in all. The same small amounts are added many thousand times: a plain sum would lose a part of each.
 #[derive(Clone, Copy, Debug, Default)]
 struct Books {
     /// When observers were told, simulated time, s.
     time: Option<f64>,
-    impulse_gravity: Vector3<f64>,
-    impulse_near_field: Vector3<f64>,
-    impulse_surface: Vector3<f64>,
-    dissipated_grain: f64,
-    dissipated_surface: f64,
-    work_near_field: f64,
+    impulse_gravity: VectorSum,
+    impulse_near_field: VectorSum,
+    impulse_surface: VectorSum,
+    dissipated_grain: Sum,
+    dissipated_surface: Sum,
+    work_near_field: Sum,
     /// m g·x of grains that left, less that of grains that entered, J.
     carried_away: f64,
     /// m g·x of the grains inside, J.
@@ -174,15 +175,15 @@ impl Books {
     fn since(&self, told: &Self) -> (Kick, Rest) {
         let kick = Kick {
             work_gravity: self.depth + self.carried_away - told.depth - told.carried_away,
-            impulse_gravity: self.impulse_gravity - told.impulse_gravity,
-            impulse_near_field: self.impulse_near_field - told.impulse_near_field,
-            work_near_field: self.work_near_field - told.work_near_field,
+            impulse_gravity: self.impulse_gravity.value() - told.impulse_gravity.value(),
+            impulse_near_field: self.impulse_near_field.value() - told.impulse_near_field.value(),
+            work_near_field: self.work_near_field.value() - told.work_near_field.value(),
             ..Kick::default()
         };
-        let grains = self.dissipated_grain - told.dissipated_grain;
-        let surface = self.dissipated_surface - told.dissipated_surface;
+        let grains = self.dissipated_grain.value() - told.dissipated_grain.value();
+        let surface = self.dissipated_surface.value() - told.dissipated_surface.value();
         let rest = Rest {
-            impulse_surface: self.impulse_surface - told.impulse_surface,
+            impulse_surface: self.impulse_surface.value() - told.impulse_surface.value(),
             dissipated_grain: grains.max(0.0),
             dissipated_surface: surface.max(0.0),
             added: (-grains).max(0.0) + (-surface).max(0.0),
@@ -382,7 +383,7 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
                     let change = Change { end: end[slot], pull, carried };
                     let moved = domain.nearest(flight.position - start.position);
                     let (contacts, near_field) = start.work(moved, flight.velocity, &change, gravity, ended);
-                    books.dissipated_grain -= contacts * grain.mass;
+                    books.dissipated_grain += -contacts * grain.mass;
                     books.work_near_field += near_field * grain.mass;
                 }
                 *start = Start { id: grain.id, position: flight.position, pull, carried };

@@ -3,6 +3,8 @@
 // Each test file is a crate of its own and uses its share of this one.
 #![allow(dead_code, unreachable_pub)]
 
+pub mod forced;
+
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
 

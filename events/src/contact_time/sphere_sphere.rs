@@ -53,19 +53,20 @@ pub fn sphere_sphere(a: &Flight, b: &Flight, shift: Vector3<f64>) -> Option<f64>
     None
 }
 
-/// As [`sphere_sphere`] for spheres under force, which may press against each other: a pair that touches already, nearer than ¼ `slack` (m), meets only when
-/// it overlaps by `slack`.
+/// As [`sphere_sphere`] for spheres under force, which may press against each other: a pair that touches already, nearer than ¼ `slack` (m), meets only where
+/// it would overlap by `slack` at some time up to `horizon` (s, epoch time), the end of the sub-step.
 ///
-/// So what is left of an approach when a contact has come to rest makes no event as long as it leads nowhere.
+/// So what is left of an approach when a contact has come to rest makes no event as long as it leads nowhere. A pair that happens to be as near as that
+/// when a sub-step begins, and comes on, meets when it touches.
 #[must_use]
-pub fn sphere_sphere_yielding(a: &Flight, b: &Flight, shift: Vector3<f64>, slack: f64) -> Option<f64> {
+pub fn sphere_sphere_yielding(a: &Flight, b: &Flight, shift: Vector3<f64>, slack: f64, horizon: f64) -> Option<f64> {
     let base = a.time.max(b.time);
     let touching = a.radius + b.radius + 0.25 * slack;
-    if (b.position_at(base) - a.position_at(base) + shift).norm_squared() > touching * touching {
-        return sphere_sphere(a, b, shift);
+    if (b.position_at(base) - a.position_at(base) + shift).norm_squared() <= touching * touching {
+        let shrunk = |flight: &Flight| Flight { radius: flight.radius - 0.5 * slack, ..*flight };
+        sphere_sphere(&shrunk(a), &shrunk(b), shift).filter(|&time| time <= horizon)?;
     }
-    let shrunk = |flight: &Flight| Flight { radius: flight.radius - 0.5 * slack, ..*flight };
-    sphere_sphere(&shrunk(a), &shrunk(b), shift)
+    sphere_sphere(a, b, shift)
 }
 
 /// Whether the spheres `a` and `b` may touch until `until` (s, epoch time): a bound without branch or root that hardly ever says yes in

@@ -86,7 +86,9 @@ pub struct Encounters<S: Surface = NoSurface, C: Calendar = Tournament> {
     vacant: Vec<u32>,
     /// End of the epoch: nothing beyond it is scheduled.
     horizon: f64,
-    /// Accelerations of the grains, m/s²; empty where none acts. Then the flights are chords ([`Bend`]) and the epoch is a sub-step.
+    /// Whether forces act. Then the flights are chords ([`Bend`]) and the epoch is a sub-step.
+    under_force: bool,
+    /// Accelerations of the grains, m/s²; empty where no force acts.
     accelerations: Vec<Vector3<f64>>,
     /// Cells crossed since their layout was last thought over.
     crossings: usize,
@@ -128,6 +130,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             domain,
             vacant: Vec::new(),
             horizon: f64::INFINITY,
+            under_force: false,
             accelerations: Vec::new(),
             crossings: 0,
             looks: 0,
@@ -219,7 +222,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     ///
     /// It is accelerated at `acceleration` (m/s²) until the next sub-step, if there are such.
     pub fn insert(&mut self, mut flight: Flight, acceleration: Vector3<f64>) -> u32 {
-        if !self.accelerations.is_empty() {
+        if self.under_force {
             let bend = Bend { acceleration, step: self.horizon };
             flight.position -= bend.offset(flight.time);
             flight.velocity -= bend.velocity(flight.time);
@@ -228,7 +231,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         if grain as usize == self.flights.len() {
             self.flights.push(flight);
             self.plans.push(NO_PLAN);
-            if !self.accelerations.is_empty() {
+            if self.under_force {
                 self.accelerations.push(acceleration);
             }
         } else {
@@ -472,12 +475,12 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     fn search(&self, grain: u32) -> Search<'_> {
         let (flight, plan) = (self.flights[grain as usize], &self.plans[grain as usize]);
         let until = plan.pair.time.min(plan.side.time).min(self.horizon);
-        let under_force = !self.accelerations.is_empty();
         Search {
             grain,
             flight,
             until,
-            under_force,
+            under_force: self.under_force,
+            horizon: self.horizon,
             flights: &self.flights,
             plans: &self.plans,
             best: plan.pair,

@@ -61,6 +61,8 @@ pub(super) struct Search<'a> {
     pub(super) until: f64,
     /// Whether grains press against each other.
     pub(super) under_force: bool,
+    /// End of the sub-step, s.
+    pub(super) horizon: f64,
     pub(super) flights: &'a [Flight],
     pub(super) plans: &'a [Plan],
     /// The best so far.
@@ -82,7 +84,7 @@ impl Search<'_> {
         }
         let met = if self.under_force {
             let slack = YIELDING * self.flight.radius.min(theirs.radius);
-            sphere_sphere_yielding(&self.flight, theirs, shift, slack)
+            sphere_sphere_yielding(&self.flight, theirs, shift, slack, self.horizon)
         } else {
             sphere_sphere(&self.flight, theirs, shift)
         };

@@ -55,6 +55,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         kick: impl FnOnce(&S, &[Touch], &mut [Flight], &mut [Vector3<f64>]) -> f64,
     ) {
         self.halt(duration);
+        self.under_force = true;
         self.accelerations.resize(self.flights.len(), Vector3::zeros());
         let touches = self.touches(reach);
         let next = kick(&self.surface, &touches, &mut self.flights, &mut self.accelerations);
@@ -81,7 +82,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
 
     /// Makes neighbour lists for the coming sub-steps, where there are such and it pays.
     pub(super) fn make_lists(&mut self) -> bool {
-        if self.accelerations.is_empty() {
+        if !self.under_force {
             return false;
         }
         let (flights, largest) = self.flights_and_largest_radius();
