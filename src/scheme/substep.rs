@@ -97,9 +97,6 @@ pub struct Substepped<S: Surface, C: Calendar = Tournament> {
     steps: u64,
 }
 
-/// Approach, as a part of what the strongest force gives in a sub-step, that contacts at rest may keep.
-const SETTLED: f64 = 1e-6;
-
 /// How a grain went into a sub-step, so that the work done on it can be booked.
 #[derive(Clone, Copy, Debug)]
 struct Start {
@@ -392,7 +389,7 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
                 books.impulse_gravity += gravity * (grain.mass * both);
                 books.impulse_near_field += (pull - gravity) * (grain.mass * both);
             }
-            let settled = resting.settle(grains, flights, SETTLED * strongest * step);
+            let settled = resting.settle(grains, flights, strongest * step);
             books.impulse_surface += settled.impulse_surface;
             books.dissipated_grain += settled.dissipated;
             for (flight, acceleration) in flights.iter_mut().zip(&*accelerations) {

@@ -67,9 +67,9 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         let mut touches = Vec::new();
         for a in self.inside() {
             let ours = self.flights[a as usize];
-            self.visit(a, |b, _| {
+            self.visit(a, |b, shift| {
                 let theirs = self.flights[b as usize];
-                let apart = self.domain.nearest(theirs.position - ours.position);
+                let apart = theirs.position + shift - ours.position;
                 let within = ours.radius + theirs.radius + reach;
                 if a < b && apart.norm_squared() < within * within {
                     touches.push(Touch { a, b, apart });
