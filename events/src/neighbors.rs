@@ -16,6 +16,8 @@ use crate::{Domain, Flight};
 const CELL_MARGIN: f64 = 1e-6;
 /// Fewest cells along an axis of a periodic domain. With four, two grains in adjacent cells have one nearest image.
 const FEWEST_PERIODIC_CELLS: i32 = 4;
+/// No grain stands so many cells from the corner when the grid is laid out: the numbers of cells (below 2^31) then last for an epoch.
+const FARTHEST_CELL: f64 = (1u32 << 29) as f64;
 /// Slots for each grain, at least: more cost memory, fewer are shared by cells.
 const SLOTS_PER_GRAIN: usize = 4;
 /// Steps between the slots of cells that are adjacent along x, y and z, modulo the number of slots (a power of two). Odd
@@ -130,7 +132,9 @@ impl Layout {
         }
         let volume: f64 = axes.iter().map(|&axis| extent[axis]).product();
         let one_in_each_slot = (volume / slots(flights.len()) as f64).powf(1.0 / axes.len() as f64);
-        let width = contact.max(width.unwrap_or(one_in_each_slot));
+        let reach = |flight: &Flight| (flight.position_at(now) - corner - drift * now).amax();
+        let farthest = flights.iter().map(reach).fold(0.0, f64::max);
+        let width = contact.max(width.unwrap_or(one_in_each_slot)).max(farthest / FARTHEST_CELL);
         let (mut size, mut period) = (Vector3::repeat(width), Vector3::zeros());
         if domain.periodic {
             for &axis in axes {

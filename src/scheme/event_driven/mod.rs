@@ -215,6 +215,11 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
                     break;
                 }
                 self.start_epoch(self.epoch);
+                self.time = self.epoch_start;
+                // Where hardly anything collides an epoch may be all there is to watch.
+                if watch(self.progress()).is_break() {
+                    return Ok(ControlFlow::Break(()));
+                }
                 continue;
             };
             self.watch_for_jam(time, encounter)?;
