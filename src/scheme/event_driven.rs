@@ -48,6 +48,12 @@ pub const LARGEST_OVERLAP_WITH_FORCES: f64 = 1e-3;
 /// A contact under force whose approach speed is below this part of what the force gives in a sub-step has come to rest. A bouncing grain then
 /// comes to rest early by this part of a sub-step over 1 - e.
 const STICKING: f64 = 1e-8;
+/// A sub-step ends early once so many contacts a grain, and [`HOLDS`] more, have been held in it. One by one, grains that are pressed together
+/// come to rest as slowly as heat spreads; at a kick that is done for all of them at once, at the price of about so many of these events.
+const HOLDS_PER_GRAIN: f64 = 0.5;
+const HOLDS: f64 = 16.0;
+/// A sub-step that ends before this part of its length makes the next one more patient, twice as much each time: time goes on.
+const HASTY: f64 = 1.0 / 64.0;
 /// What is taken off an acceleration into a contact at rest, more than itself: enough that rounding leaves none of it.
 const RELIEF: f64 = 1.0 + 1.0 / (1u64 << 48) as f64;
 /// The law of a contact in a collapse.
@@ -186,6 +192,10 @@ pub struct EventDriven<S: Surface, C: Calendar = Tournament> {
     synchronised: FxHashSet<[u32; 2]>,
     /// What contacts at rest did since it was last asked.
     held: Held,
+    /// How many may be held until the sub-step ends early.
+    holds_left: u64,
+    /// By how much sub-steps are more patient than usual, as a power of two.
+    patience: i32,
     /// Simulated time that has been reached, s.
     time: f64,
     entered: u64,
@@ -226,6 +236,8 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             anchors: Vec::new(),
             synchronised: FxHashSet::default(),
             held: Held::default(),
+            holds_left: u64::MAX,
+            patience: 0,
             time: start,
             entered,
             collisions: 0,
@@ -277,6 +289,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     ) {
         self.under = *under;
         let after = self.time - self.epoch_start;
+        self.patience = if self.forces && after < HASTY * self.epoch { self.patience + 1 } else { 0 };
+        let grains = self.encounters.count() as f64;
+        self.holds_left = ((HOLDS + HOLDS_PER_GRAIN * grains) * 2f64.powi(self.patience)) as u64;
         self.natural_epoch(after);
         self.forces = true;
         let (grains, mut length, mut strongest) = (&mut self.grains, 0.0, 0.0);
@@ -371,6 +386,8 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
 
     /// Resolves all events up to simulated time `end` (s). When and how often it is called changes nothing of what happens.
     ///
+    /// Under forces it stops earlier where [`is_pressed`](Self::is_pressed) says so.
+    ///
     /// # Errors
     /// A broken invariant: grains that overlap, or a state that is no number.
     pub fn advance(
@@ -400,6 +417,10 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             if self.outrun && !self.forces {
                 self.start_epoch(time);
             }
+            if self.is_pressed() {
+                self.time = now;
+                return Ok(ControlFlow::Continue(()));
+            }
             self.since_watch += 1;
             if self.since_watch == ENCOUNTERS_PER_WATCH {
                 self.since_watch = 0;
@@ -411,6 +432,12 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         }
         self.time = end;
         Ok(watch(self.progress()))
+    }
+
+    /// Whether so many contacts have come to rest that the sub-step should end.
+    #[must_use]
+    pub fn is_pressed(&self) -> bool {
+        self.holds_left == 0
     }
 
     /// Stops a run in which time no longer goes on.
@@ -632,6 +659,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.check(time, &ids, overlap_over_radius, &after)?;
         self.held.dissipated_grain += impulse.dot(&(first.velocity - second.velocity + (after[0] - after[1]))) * 0.5;
         self.held.contacts += 1;
+        self.holds_left = self.holds_left.saturating_sub(1);
         self.deflect(&[(grains[0], after[0]), (grains[1], after[1])]);
         Ok(())
     }
@@ -662,6 +690,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.held.impulse_surface += (self.encounters.flight(grain).velocity - chord) * before.mass;
         self.held.dissipated_surface += 0.5 * before.mass * (before.velocity.norm_squared() - after.norm_squared());
         self.held.contacts += 1;
+        self.holds_left = self.holds_left.saturating_sub(1);
         Ok(())
     }
 
