@@ -282,6 +282,15 @@ impl Resting {
         let least =
             (CLOSING * UNNOTICED * smallest / (step * step)).clamp(ACCURACY[0] * largest, ACCURACY[1] * largest);
         sweep(&mut self.contacts, &mut self.movers, least);
+        for contact in self.contacts.iter_mut().filter(|contact| contact.first == self.surface) {
+            // What is left of the sweeps would be a tiny fall, and a hit.
+            let along = contact.rate(&self.movers).dot(&contact.normal);
+            let push = contact.mass * (contact.closing - along);
+            if push > -contact.force.dot(&contact.normal) {
+                contact.force += contact.normal * push;
+                contact.push(&mut self.movers, contact.normal * push);
+            }
+        }
         self.angular.clear();
         for ((pull, flight), mover) in pull.iter_mut().zip(flights).zip(&self.movers) {
             *pull = mover.linear;

@@ -80,10 +80,14 @@ pub struct Substepped<S: Surface, C: Calendar = Tournament> {
     step: f64,
     /// Length of the sub-step that has ended, s.
     ended: f64,
+    /// By how much its middle was earlier than planned, s.
+    missing: f64,
     /// End of the current sub-step, simulated time, s.
     step_end: f64,
     /// What acted on each grain at the last kick, m/s², without what contacts carry.
     pull: Vec<Vector3<f64>>,
+    /// Accelerations at the end of the sub-step before, contacts included, m/s²; kept for its memory.
+    end: Vec<Vector3<f64>>,
     /// How each grain went into the sub-step.
     starts: Vec<Start>,
     domain: Domain,
@@ -189,6 +193,16 @@ impl Books {
         (kick, rest)
     }
 
+    /// Adds the impulse `of_all` that acts on all grains (N s), of which gravity has its part and the near field, where there is one, the rest.
+    fn add_impulse(&mut self, forces: &Forces, gravity: Vector3<f64>, of_all: Vector3<f64>) {
+        self.impulse_gravity += gravity;
+        if forces.near_field.is_some() {
+            self.impulse_near_field += of_all - gravity;
+        } else {
+            self.impulse_surface += of_all - gravity;
+        }
+    }
+
     fn held(&mut self, held: &Held) {
         self.impulse_surface += held.impulse_surface;
         self.dissipated_grain += held.dissipated_grain;
@@ -237,8 +251,10 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             length,
             step: 0.0,
             ended: 0.0,
+            missing: 0.0,
             step_end,
             pull: Vec::new(),
+            end: Vec::new(),
             starts: Vec::new(),
             strengths,
             books: Books::default(),
@@ -272,10 +288,26 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             if self.engine.advance(until, &mut (&mut self.passages, &mut *observer), watch)?.is_break() {
                 return Ok(ControlFlow::Break(()));
             }
-            if until >= end {
+            if self.engine.is_pressed() {
+                self.end_early();
+            } else if until >= end {
                 return Ok(ControlFlow::Continue(()));
             }
         }
+    }
+
+    /// Ends the sub-step here and now: from now on it is as if it had been planned so.
+    ///
+    /// What forces give until the middle of a sub-step is in its chords and booked when it begins. The middle is earlier now.
+    fn end_early(&mut self) {
+        let now = self.engine.time();
+        let missing = 0.5 * (self.step_end - now);
+        let (mass, lag, _) = self.engine.lag(now);
+        let given = self.engine.lag(now + missing).1 - lag;
+        self.books.add_impulse(&self.forces, -self.forces.gravity * (mass * missing), -given);
+        self.ended -= 2.0 * missing;
+        self.step_end = now;
+        self.missing = missing;
     }
 
     /// Chooses the length of the next sub-steps.
@@ -350,9 +382,9 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
 
     /// Ends a sub-step and starts the next.
     fn kick(&mut self) -> Result<(), Broken> {
-        let ended = self.ended;
+        let (ended, missing) = (self.ended, std::mem::take(&mut self.missing));
         self.books.held(&self.engine.take_held());
-        let Self { engine, forces, laws, resting, pull, starts, domain, books, step, strengths, .. } = self;
+        let Self { engine, forces, laws, resting, pull, starts, end, domain, books, step, strengths, .. } = self;
         let step = *step;
         let strongest = pull.iter().map(|pull| pull.norm()).fold(forces.gravity.norm(), f64::max);
         let reach = Resting::reach(engine.largest_radius(), 2.0 * strongest, step);
@@ -362,7 +394,16 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
         let near_field = forces.near_field.as_ref().filter(plain_at_contact).map(|sum| *sum.law());
         let under = Under { reach, gravity, near_field, contact_time: forces.contact_time };
         engine.start_sub_step(&under, |surface, touches, grains, flights, accelerations| {
-            let end = accelerations.to_vec();
+            end.clear();
+            end.extend_from_slice(accelerations);
+            if missing > 0.0 {
+                for (slot, (flight, grain)) in flights.iter_mut().zip(grains.iter_mut()).enumerate() {
+                    if starts.get(slot).is_some_and(|start| start.id == grain.id) && flight.radius > 0.0 {
+                        flight.velocity -= end[slot] * missing;
+                        books.dissipated_grain += rotate(flight, grain, -resting.angular(slot) * missing);
+                    }
+                }
+            }
             outcome = forces.pull(grains, flights, *strengths, pull);
             accelerations.copy_from_slice(pull);
             let strongest = pull.iter().map(|pull| pull.norm()).fold(0.0, f64::max);
@@ -413,13 +454,7 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
         let mut books = self.books;
         books.held(&self.engine.held());
         let (mass, lag, in_step) = self.engine.lag(time);
-        let gravity = self.forces.gravity * (mass * in_step);
-        books.impulse_gravity += gravity;
-        if self.forces.near_field.is_some() {
-            books.impulse_near_field += lag - gravity;
-        } else {
-            books.impulse_surface += lag - gravity;
-        }
+        books.add_impulse(&self.forces, self.forces.gravity * (mass * in_step), lag);
         books.carried_away = self.passages.depth(self.forces.gravity);
         let (depth, potential) = self.engine.snapshot(time, |snapshot| {
             let depth = snapshot

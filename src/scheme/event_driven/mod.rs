@@ -198,6 +198,8 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
 
     /// Resolves all events up to simulated time `end` (s). When and how often it is called changes nothing of what happens.
     ///
+    /// Under forces it stops earlier where [`is_pressed`](Self::is_pressed) says so.
+    ///
     /// # Errors
     /// A broken invariant: grains that overlap, or a state that is no number.
     pub fn advance(
@@ -231,6 +233,10 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             let now = self.epoch_start + time;
             if self.outrun && !self.force.acts {
                 self.start_epoch(time);
+            }
+            if self.is_pressed() {
+                self.time = now;
+                return Ok(ControlFlow::Continue(()));
             }
             self.since_watch += 1;
             if self.since_watch == ENCOUNTERS_PER_WATCH {

@@ -14,6 +14,12 @@ use crate::scheme::Broken;
 /// A contact under force whose approach speed is below this part of what the force gives in a sub-step has come to rest. A bouncing grain then
 /// comes to rest early by this part of a sub-step over 1 - e.
 const STICKING: f64 = 1e-8;
+/// A sub-step ends early once so many contacts a grain, and [`HOLDS`] more, have been held in it. One by one, grains that are pressed together
+/// come to rest as slowly as heat spreads; at a kick that is done for all of them at once, at the price of about so many of these events.
+const HOLDS_PER_GRAIN: f64 = 0.5;
+const HOLDS: f64 = 16.0;
+/// A sub-step that ends before this part of its length makes the next one more patient, twice as much each time: time goes on.
+const HASTY: f64 = 1.0 / 64.0;
 /// What is taken off an acceleration into a contact at rest, more than itself: enough that rounding leaves none of it.
 const RELIEF: f64 = 1.0 + 1.0 / (1u64 << 48) as f64;
 /// What acts in a sub-step.
@@ -62,6 +68,10 @@ pub(super) struct UnderForce {
     synchronised: FxHashSet<[u32; 2]>,
     /// What contacts at rest did since it was last asked.
     pub(super) held: Held,
+    /// How many may be held until the sub-step ends early.
+    holds_left: u64,
+    /// By how much sub-steps are more patient than usual, as a power of two.
+    patience: i32,
 }
 
 impl<S: Surface, C: Calendar> EventDriven<S, C> {
@@ -74,6 +84,10 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     ) {
         self.force.under = *under;
         let after = self.time - self.epoch_start;
+        let hasty = self.force.acts && after < HASTY * self.epoch;
+        self.force.patience = if hasty { self.force.patience + 1 } else { 0 };
+        let holds = HOLDS + HOLDS_PER_GRAIN * self.encounters.count() as f64;
+        self.force.holds_left = (holds * 2f64.powi(self.force.patience)) as u64;
         self.natural_epoch(after);
         self.force.acts = true;
         let (grains, mut length, mut strongest) = (&mut self.grains, 0.0, 0.0);
@@ -91,6 +105,12 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             self.force.anchors.extend(slots.map(|grain| self.encounters.flight(grain).position));
         }
         self.begin(after, length);
+    }
+
+    /// Whether so many contacts have come to rest that the sub-step should end.
+    #[must_use]
+    pub fn is_pressed(&self) -> bool {
+        self.force.acts && self.force.holds_left == 0
     }
 
     /// What contacts at rest did since it was last taken.
@@ -180,6 +200,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.force.held.dissipated_grain +=
             impulse.dot(&(first.velocity - second.velocity + (after[0] - after[1]))) * 0.5;
         self.force.held.contacts += 1;
+        self.force.holds_left = self.force.holds_left.saturating_sub(1);
         self.deflect(&[(grains[0], after[0]), (grains[1], after[1])]);
         Ok(())
     }
@@ -211,6 +232,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.force.held.dissipated_surface +=
             0.5 * before.mass * (before.velocity.norm_squared() - after.norm_squared());
         self.force.held.contacts += 1;
+        self.force.holds_left = self.force.holds_left.saturating_sub(1);
         Ok(())
     }
 
