@@ -48,8 +48,9 @@ pub const LARGEST_OVERLAP_WITH_FORCES: f64 = 1e-3;
 /// A contact under force whose approach speed is below this part of what the force gives in a sub-step has come to rest. A bouncing grain then
 /// comes to rest early by this part of a sub-step over 1 - e.
 const STICKING: f64 = 1e-8;
-/// What is taken off an acceleration into a contact at rest, more than itself: enough that rounding leaves none of it.
-const RELIEF: f64 = 1.0 + 1.0 / (1u64 << 48) as f64;
+/// What a contact at rest leaves of an acceleration, out of the contact, over the whole of it: enough that rounding turns none of it inwards, or the
+/// contact would be met again and again at the same time.
+const RELIEF: f64 = 1.0 / (1u64 << 48) as f64;
 /// The law of a contact in a collapse.
 const ELASTIC: ContactLaw = ContactLaw { restitution: 1.0, friction: Friction::Smooth };
 /// Encounters between two looks at the watch (progress, Ctrl-C).
@@ -656,8 +657,8 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.check(time, &[id], -contact.gap / before.radius, &[after])?;
         let chord = self.encounters.flight(grain).velocity;
         let acceleration = self.encounters.bend(grain).acceleration;
-        let pull = acceleration.dot(&contact.normal).min(0.0);
-        self.encounters.accelerate(grain, acceleration - contact.normal * (pull * RELIEF));
+        let pull = (acceleration.dot(&contact.normal) - RELIEF * acceleration.amax()).min(0.0);
+        self.encounters.accelerate(grain, acceleration - contact.normal * pull);
         self.deflect(&[(grain, after)]);
         self.held.impulse_surface += (self.encounters.flight(grain).velocity - chord) * before.mass;
         self.held.dissipated_surface += 0.5 * before.mass * (before.velocity.norm_squared() - after.norm_squared());
