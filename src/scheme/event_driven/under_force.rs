@@ -20,8 +20,9 @@ const HOLDS_PER_GRAIN: f64 = 0.5;
 const HOLDS: f64 = 16.0;
 /// A sub-step that ends before this part of its length makes the next one more patient, twice as much each time: time goes on.
 const HASTY: f64 = 1.0 / 64.0;
-/// What is taken off an acceleration into a contact at rest, more than itself: enough that rounding leaves none of it.
-const RELIEF: f64 = 1.0 + 1.0 / (1u64 << 48) as f64;
+/// What a contact at rest leaves of an acceleration, out of the contact, over the whole of it: enough that rounding turns none of it inwards, or the
+/// contact would be met again and again at the same time.
+const RELIEF: f64 = 1.0 / (1u64 << 48) as f64;
 /// What acts in a sub-step.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::scheme) struct Under {
@@ -225,8 +226,8 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.check(time, &[id], -contact.gap / before.radius, &[after])?;
         let chord = self.encounters.flight(grain).velocity;
         let acceleration = self.encounters.bend(grain).acceleration;
-        let pull = acceleration.dot(&contact.normal).min(0.0);
-        self.encounters.accelerate(grain, acceleration - contact.normal * (pull * RELIEF));
+        let pull = (acceleration.dot(&contact.normal) - RELIEF * acceleration.amax()).min(0.0);
+        self.encounters.accelerate(grain, acceleration - contact.normal * pull);
         self.deflect(&[(grain, after)]);
         self.force.held.impulse_surface += (self.encounters.flight(grain).velocity - chord) * before.mass;
         self.force.held.dissipated_surface +=
