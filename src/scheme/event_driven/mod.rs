@@ -287,9 +287,10 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.rows.get_mut(grain as usize).is_some_and(|row| row.note(time, within, partner, approach, in_line))
     }
 
-    /// The law of a contact in a collapse: elastic where grains fly apart after it, plastic where forces press them together until they rest.
+    /// The law of a contact in a collapse: elastic where grains fly apart after it, plastic where forces press them together until they rest. What
+    /// loses nothing by its law loses nothing here.
     fn law_in_collapse(&self, law: &ContactLaw) -> ContactLaw {
-        if self.force.acts { ContactLaw { restitution: 0.0, ..*law } } else { ELASTIC }
+        if self.force.acts && law.restitution < 1.0 { ContactLaw { restitution: 0.0, ..*law } } else { ELASTIC }
     }
 
     /// Two grains touch.
