@@ -11,6 +11,7 @@ use std::ops::ControlFlow;
 use impinge_events::calendar::{Calendar, Tournament};
 use impinge_events::{Domain, Flight, Surface};
 use nalgebra::Vector3;
+use rustc_hash::FxHashMap;
 
 use super::event_driven::{Held, Under};
 use super::resting::Resting;
@@ -384,6 +385,12 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
     fn kick(&mut self) -> Result<(), Broken> {
         let (ended, missing) = (self.ended, std::mem::take(&mut self.missing));
         self.books.held(&self.engine.take_held());
+        if !self.passages.gone.is_empty() {
+            let (contacts, near_field) = self.work_on(&self.passages.gone);
+            self.books.dissipated_grain += -contacts;
+            self.books.work_near_field += near_field;
+            self.passages.gone.clear();
+        }
         let Self { engine, forces, laws, resting, pull, starts, end, domain, books, step, strengths, .. } = self;
         let step = *step;
         let strongest = pull.iter().map(|pull| pull.norm()).fold(forces.gravity.norm(), f64::max);
@@ -417,13 +424,14 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             for (slot, flight) in flights.iter_mut().enumerate().filter(|(_, flight)| flight.radius > 0.0) {
                 let (start, grain) = (&mut starts[slot], &mut grains[slot]);
                 let (pull, carried) = (pull[slot], accelerations[slot] - pull[slot]);
-                if start.id == grain.id {
-                    let change = Change { end: end[slot], pull, carried };
-                    let moved = domain.nearest(flight.position - start.position);
-                    let (contacts, near_field) = start.work(moved, flight.velocity, &change, gravity, ended);
-                    books.dissipated_grain += -contacts * grain.mass;
-                    books.work_near_field += near_field * grain.mass;
-                }
+                // One that has entered since was under gravity alone.
+                let entered = Start { id: grain.id, position: flight.position, pull: gravity, carried: Vector3::zeros() };
+                let begun = if start.id == grain.id { *start } else { entered };
+                let change = Change { end: end[slot], pull, carried };
+                let moved = domain.nearest(flight.position - begun.position);
+                let (contacts, near_field) = begun.work(moved, flight.velocity, &change, gravity, ended);
+                books.dissipated_grain += -contacts * grain.mass;
+                books.work_near_field += near_field * grain.mass;
                 *start = Start { id: grain.id, position: flight.position, pull, carried };
                 flight.velocity += accelerations[slot] * (0.5 * ended);
                 books.dissipated_grain += rotate(flight, grain, resting.angular(slot) * both);
@@ -456,6 +464,9 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
         let (mass, lag, in_step) = self.engine.lag(time);
         books.add_impulse(&self.forces, self.forces.gravity * (mass * in_step), lag);
         books.carried_away = self.passages.depth(self.forces.gravity);
+        let (contacts, near_field) = self.work_in_step(time);
+        books.dissipated_grain += -contacts;
+        books.work_near_field += near_field;
         let (depth, potential) = self.engine.snapshot(time, |snapshot| {
             let depth = snapshot
                 .flights
@@ -479,6 +490,33 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
         observer.rest(&Rest { time, contacts: self.resting.count(), ..rest });
         self.told = Books { time: Some(time), ..books };
         Ok(())
+    }
+
+    /// Work (J) that contacts at rest and the near field have done in the current sub-step until `time` (s).
+    fn work_in_step(&self, time: f64) -> (f64, f64) {
+        if self.resting.is_empty() && self.forces.near_field.is_none() {
+            return (0.0, 0.0);
+        }
+        let mut now = self.passages.gone.clone();
+        self.engine.snapshot(time, |snapshot| {
+            let all = snapshot.flights.iter().zip(snapshot.grains);
+            now.extend(all.map(|(flight, grain)| (grain.id, flight.position, grain.mass)));
+        });
+        self.work_on(&now)
+    }
+
+    /// Work (J) of contacts at rest and of the near field since the sub-step began on grains of these ids, until they were in these places (m), with these
+    /// masses (kg): at constant acceleration, force times way.
+    fn work_on(&self, grains: &[(u64, Vector3<f64>, f64)]) -> (f64, f64) {
+        let starts: FxHashMap<u64, &Start> = self.starts.iter().map(|start| (start.id, start)).collect();
+        let (mut contacts, mut near_field) = (Sum::default(), Sum::default());
+        for &(id, position, mass) in grains {
+            let Some(start) = starts.get(&id) else { continue };
+            let moved = self.domain.nearest(position - start.position);
+            contacts += start.carried.dot(&moved) * mass;
+            near_field += (start.pull - self.forces.gravity).dot(&moved) * mass;
+        }
+        (contacts.value(), near_field.value())
     }
 
     /// Takes a grain in at simulated time `time` (s), to which the run has been advanced. The near field acts on it from the next sub-step on.
@@ -536,10 +574,13 @@ fn rounded(step: f64) -> f64 {
     (step / unit).round() * unit
 }
 
-/// Where grains came in and went out, m x (kg m).
-#[derive(Clone, Copy, Debug, Default)]
+/// Where grains came in and went out.
+#[derive(Clone, Debug, Default)]
 struct Passages {
+    /// m x of those that went out less that of those that came in, kg m.
     left: Vector3<f64>,
+    /// Ids, places (m) and masses (kg) of those that went out in the current sub-step.
+    gone: Vec<(u64, Vector3<f64>, f64)>,
 }
 
 impl Passages {
@@ -552,6 +593,9 @@ impl Passages {
 impl Observer for Passages {
     fn passage(&mut self, passage: Passage, _time: f64, flight: &Flight, grain: &Grain) {
         let sign = if passage == Passage::Entered { -1.0 } else { 1.0 };
+        if passage != Passage::Entered {
+            self.gone.push((grain.id, flight.position, grain.mass));
+        }
         self.left += flight.position * (sign * grain.mass);
     }
 }
