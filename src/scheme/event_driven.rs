@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use impinge_events::calendar::{Calendar, Tournament};
 use impinge_events::{Domain, Encounter, Encounters, Flight, Surface, SurfaceContact, Touch, YIELDING};
 use nalgebra::Vector3;
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::{Broken, GrainCollision, Observer, Passage, Progress, SurfaceHit};
 use crate::grains::{Grain, NewGrain, Snapshot};
@@ -152,6 +152,15 @@ pub struct Held {
     pub contacts: u64,
 }
 
+/// A grain that the surface carries until the end of the sub-step, or until it leaves.
+#[derive(Clone, Debug, Default)]
+struct Support {
+    /// What the surface adds to the acceleration, m/s².
+    acceleration: Vector3<f64>,
+    /// Normals of the contacts, and how fast (m/s) the surface moves along each.
+    contacts: Vec<(Vector3<f64>, f64)>,
+}
+
 /// Grains, what they meet, and the laws of their meetings; advanced from event to event.
 #[derive(Clone, Debug)]
 pub struct EventDriven<S: Surface, C: Calendar = Tournament> {
@@ -185,6 +194,8 @@ pub struct EventDriven<S: Surface, C: Calendar = Tournament> {
     anchors: Vec<Vector3<f64>>,
     /// Pairs whose accelerations are those of their contact already.
     synchronised: FxHashSet<[u32; 2]>,
+    /// Grains that the surface carries since they came to rest on it in this sub-step.
+    supported: FxHashMap<u32, Support>,
     /// What contacts at rest did since it was last asked.
     held: Held,
     /// Simulated time that has been reached, s.
@@ -226,6 +237,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             resting_speed_of_pairs: 0.0,
             anchors: Vec::new(),
             synchronised: FxHashSet::default(),
+            supported: FxHashMap::default(),
             held: Held::default(),
             time: start,
             entered,
@@ -290,6 +302,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.resting_speed_of_pairs = if sticks { strongest * length } else { self.resting_speed };
         self.anchors.clear();
         self.synchronised.clear();
+        self.supported.clear();
         if under.near_field.is_some() {
             let slots = 0..self.grains.len() as u32;
             self.anchors.extend(slots.map(|grain| self.encounters.flight(grain).position));
@@ -659,16 +672,42 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let acceleration = self.encounters.bend(grain).acceleration;
         let pull = (acceleration.dot(&contact.normal) - RELIEF * acceleration.amax()).min(0.0);
         self.encounters.accelerate(grain, acceleration - contact.normal * pull);
-        self.deflect(&[(grain, after)]);
+        self.redirect(&[(grain, after)]);
+        let support = self.supported.entry(grain).or_default();
+        support.acceleration -= contact.normal * pull;
+        support.contacts.push((contact.normal, contact.velocity.dot(&contact.normal)));
         self.held.impulse_surface += (self.encounters.flight(grain).velocity - chord) * before.mass;
         self.held.dissipated_surface += 0.5 * before.mass * (before.velocity.norm_squared() - after.norm_squared());
         self.held.contacts += 1;
         Ok(())
     }
 
+    /// The surface no longer carries a grain that leaves it at `velocity` (m/s), faster than grains at rest push each other about.
+    #[cold]
+    fn let_go(&mut self, grain: u32, velocity: Vector3<f64>) {
+        let leaves = |(normal, speed): &(Vector3<f64>, f64)| velocity.dot(normal) - speed > self.resting_speed_of_pairs;
+        if self.supported.get(&grain).is_some_and(|support| support.contacts.iter().any(leaves)) {
+            let support = self.supported.remove(&grain).unwrap_or_default();
+            let chord = self.encounters.flight(grain).velocity;
+            let acceleration = self.encounters.bend(grain).acceleration;
+            self.encounters.accelerate(grain, acceleration - support.acceleration);
+            let mass = self.grains[grain as usize].mass;
+            self.held.impulse_surface += (self.encounters.flight(grain).velocity - chord) * mass;
+        }
+    }
+
     /// Gives grains that have just met something their new velocities (m/s).
     #[inline]
     fn deflect<const N: usize>(&mut self, grains: &[(u32, Vector3<f64>); N]) {
+        if !self.supported.is_empty() {
+            grains.iter().for_each(|&(grain, velocity)| self.let_go(grain, velocity));
+        }
+        self.redirect(grains);
+    }
+
+    /// The same for grains that stay where they are supported.
+    #[inline]
+    fn redirect<const N: usize>(&mut self, grains: &[(u32, Vector3<f64>); N]) {
         self.outrun |= grains.iter().any(|(_, velocity)| velocity.amax() > OUTRUN * self.fastest);
         if self.forces {
             let chord = |&(grain, velocity): &(u32, Vector3<f64>)| {
@@ -698,6 +737,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let flight = self.true_flight(grain);
         self.pass(grain, 1.0);
         observer.passage(passage, self.epoch_start + time, &flight, &self.grains[grain as usize]);
+        self.supported.remove(&grain);
         self.encounters.remove(grain);
     }
 
