@@ -11,10 +11,10 @@ use impinge_events::Domain;
 use nalgebra::Vector3;
 use rand::{RngExt as _, SeedableRng as _};
 
-/// 64 grains that rain into a trough of a floor and a slope, and bounce.
+/// 125 grains that rain into a trough of a floor and a slope, and bounce.
 fn rain(laws: Laws) -> Scene {
-    let mut grains = block(4, 0.1, 0.5, 1.0);
-    grains.iter_mut().for_each(|grain| grain.position.z += 1.3);
+    let mut grains = block(5, 0.1, 0.4, 1.0);
+    grains.iter_mut().for_each(|grain| grain.position.z += 1.4);
     let slope = plane([1.5, 0.0, 0.0], [-0.6, 0.0, 0.8]);
     let gravity = Vector3::new(0.1, 0.0, -9.81);
     Scene { surface: vec![floor(), slope], laws, gravity, ..Scene::of(grains) }
@@ -30,7 +30,6 @@ fn books_of_gravity_close_to_rounding() {
             assert!(grains > 100 && surface > 100, "{what}: {grains} and {surface} hits");
             let ledger = &outcome.ledger;
             let residuals = [ledger.relative_energy_residual(), ledger.relative_momentum_residual()];
-            eprintln!("{what}, {step} s: {residuals:?}");
             assert!(residuals.iter().all(|it| it.abs() < 1e-12), "{what}, sub-step {step}: {residuals:?}");
         }
     }
@@ -67,7 +66,6 @@ fn books_close_where_grains_enter_and_leave_under_gravity() {
     assert!(observers.0.grain_hits() > 500 && observers.0.surface_hits() > 1000);
     let residuals =
         [ledger.relative_mass_residual(), ledger.relative_energy_residual(), ledger.relative_momentum_residual()];
-    eprintln!("{residuals:?}");
     assert!(residuals.iter().all(|it| it.abs() < 1e-12), "{residuals:?}");
 }
 
@@ -91,7 +89,6 @@ fn books_of_the_near_field_close_at_second_order() {
             points.push((-f64::from(halving) * f64::ln(2.0), 0.5 * square.ln()));
         }
         let order = slope(&points);
-        eprintln!("{what}: order {order}");
         assert!((order - 2.0).abs() < 0.1, "{what}: the ledger closes at order {order}");
     }
 }
@@ -185,4 +182,42 @@ fn chosen_sub_steps_keep_to_their_tolerance() {
         steps.push(scene.run_with(Length::Within(tolerance), 1.0).steps as f64);
     }
     assert!((6.0..15.0).contains(&(steps[1] / steps[0])), "{steps:?}");
+}
+
+/// A ball that had come to rest on a slope was met again and again at one time: of what pulled it into the slope, rounding left a trace.
+#[test]
+fn a_ball_at_rest_on_a_slope_jammed() {
+    let ball = |x: f64, z: f64| grain(Vector3::new(x, 0.0, z), Vector3::new(1.0, 0.1, 0.0), 0.1, 1.0);
+    let slope = || plane([0.0; 3], [-0.6, 0.0, 0.8]);
+    for (grains, surface) in [
+        (vec![ball(-1.0, 0.2)], vec![slope()]),
+        (vec![ball(-1.0, 0.2)], vec![floor(), slope()]),
+        (vec![ball(-1.0, 0.2), ball(-1.3, 0.3)], vec![floor(), slope()]),
+    ] {
+        for laws in [smooth(0.5, 0.5), rough(0.5, 0.3)] {
+            let gravity = Vector3::new(0.1, 0.0, -9.81);
+            let scene = Scene { surface: surface.clone(), laws, gravity, ..Scene::of(grains.clone()) };
+            // In the middle of a sub-step the books of contacts at rest were behind by the work of friction in it.
+            for until in [1.5, 3.0] {
+                let ledger = scene.run(1e-3, until).ledger;
+                assert!(ledger.forces().is_some_and(|forces| forces.most_resting() > 0));
+                assert!(ledger.relative_energy_residual().abs() < 1e-12, "{:e}", ledger.relative_energy_residual());
+            }
+        }
+    }
+}
+
+/// Where the first grain enters an empty scene in the middle of a sub-step it felt nothing until the next one.
+#[test]
+fn a_grain_that_entered_an_empty_scene_did_not_fall() {
+    let scene = Scene { gravity: Vector3::z() * -10.0, ..Scene::of(Vec::new()) };
+    let mut run = scene.start(Length::Fixed(1.0));
+    advance(&mut run, 0.25, &mut ());
+    run.enter(0.25, &grain(Vector3::zeros(), Vector3::zeros(), 0.5, 1.0), &mut ());
+    for time in [0.75, 1.25, 2.0] {
+        advance(&mut run, time, &mut ());
+        let (flight, _) = states(&run, time)[0];
+        assert!((flight.position.z + 5.0 * (time - 0.25).powi(2)).abs() < 1e-14, "{time} s: {flight:?}");
+        assert!((flight.velocity.z + 10.0 * (time - 0.25)).abs() < 1e-14, "{time} s: {flight:?}");
+    }
 }

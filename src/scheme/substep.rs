@@ -425,7 +425,8 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
                 let (start, grain) = (&mut starts[slot], &mut grains[slot]);
                 let (pull, carried) = (pull[slot], accelerations[slot] - pull[slot]);
                 // One that has entered since was under gravity alone.
-                let entered = Start { id: grain.id, position: flight.position, pull: gravity, carried: Vector3::zeros() };
+                let entered =
+                    Start { id: grain.id, position: flight.position, pull: gravity, carried: Vector3::zeros() };
                 let begun = if start.id == grain.id { *start } else { entered };
                 let change = Change { end: end[slot], pull, carried };
                 let moved = domain.nearest(flight.position - begun.position);

@@ -434,6 +434,15 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     /// Gives grains that have just met something their new velocities (m/s).
     #[inline]
     fn deflect<const N: usize>(&mut self, grains: &[(u32, Vector3<f64>); N]) {
+        if !self.force.supported.is_empty() {
+            grains.iter().for_each(|&(grain, velocity)| self.let_go(grain, velocity));
+        }
+        self.redirect(grains);
+    }
+
+    /// The same for grains that stay where they are supported.
+    #[inline]
+    fn redirect<const N: usize>(&mut self, grains: &[(u32, Vector3<f64>); N]) {
         self.outrun |= grains.iter().any(|(_, velocity)| velocity.amax() > OUTRUN * self.fastest);
         if self.force.acts {
             let chord = |&(grain, velocity): &(u32, Vector3<f64>)| {
@@ -451,6 +460,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let flight = self.true_flight(grain);
         self.pass(grain, 1.0);
         observer.passage(passage, self.epoch_start + time, &flight, &self.grains[grain as usize]);
+        self.force.supported.remove(&grain);
         self.encounters.remove(grain);
     }
 

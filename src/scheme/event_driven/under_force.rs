@@ -3,7 +3,7 @@
 use impinge_events::calendar::Calendar;
 use impinge_events::{Flight, Surface, SurfaceContact, Touch, YIELDING};
 use nalgebra::Vector3;
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::EventDriven;
 use crate::grains::Grain;
@@ -53,6 +53,15 @@ pub struct Held {
     pub contacts: u64,
 }
 
+/// A grain that the surface carries until the end of the sub-step, or until it leaves.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Support {
+    /// What the surface adds to the acceleration, m/s².
+    acceleration: Vector3<f64>,
+    /// Normals of the contacts, and how fast (m/s) the surface moves along each.
+    contacts: Vec<(Vector3<f64>, f64)>,
+}
+
 /// What the engine keeps of forces.
 #[derive(Clone, Debug, Default)]
 pub(super) struct UnderForce {
@@ -67,6 +76,8 @@ pub(super) struct UnderForce {
     anchors: Vec<Vector3<f64>>,
     /// Pairs whose accelerations are those of their contact already.
     synchronised: FxHashSet<[u32; 2]>,
+    /// Grains that the surface carries since they came to rest on it in this sub-step.
+    pub(super) supported: FxHashMap<u32, Support>,
     /// What contacts at rest did since it was last asked.
     pub(super) held: Held,
     /// How many may be held until the sub-step ends early.
@@ -101,6 +112,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.force.resting_speed_of_pairs = if sticks { strongest * length } else { self.force.resting_speed };
         self.force.anchors.clear();
         self.force.synchronised.clear();
+        self.force.supported.clear();
         if under.near_field.is_some() {
             let slots = 0..self.grains.len() as u32;
             self.force.anchors.extend(slots.map(|grain| self.encounters.flight(grain).position));
@@ -228,13 +240,31 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let acceleration = self.encounters.bend(grain).acceleration;
         let pull = (acceleration.dot(&contact.normal) - RELIEF * acceleration.amax()).min(0.0);
         self.encounters.accelerate(grain, acceleration - contact.normal * pull);
-        self.deflect(&[(grain, after)]);
+        self.redirect(&[(grain, after)]);
+        let support = self.force.supported.entry(grain).or_default();
+        support.acceleration -= contact.normal * pull;
+        support.contacts.push((contact.normal, contact.velocity.dot(&contact.normal)));
         self.force.held.impulse_surface += (self.encounters.flight(grain).velocity - chord) * before.mass;
         self.force.held.dissipated_surface +=
             0.5 * before.mass * (before.velocity.norm_squared() - after.norm_squared());
         self.force.held.contacts += 1;
         self.force.holds_left = self.force.holds_left.saturating_sub(1);
         Ok(())
+    }
+
+    /// The surface no longer carries a grain that leaves it at `velocity` (m/s), faster than grains at rest push each other about.
+    #[cold]
+    pub(super) fn let_go(&mut self, grain: u32, velocity: Vector3<f64>) {
+        let resting = self.force.resting_speed_of_pairs;
+        let leaves = |(normal, speed): &(Vector3<f64>, f64)| velocity.dot(normal) - speed > resting;
+        if self.force.supported.get(&grain).is_some_and(|support| support.contacts.iter().any(leaves)) {
+            let support = self.force.supported.remove(&grain).unwrap_or_default();
+            let chord = self.encounters.flight(grain).velocity;
+            let acceleration = self.encounters.bend(grain).acceleration;
+            self.encounters.accelerate(grain, acceleration - support.acceleration);
+            let mass = self.grains[grain as usize].mass;
+            self.force.held.impulse_surface += (self.encounters.flight(grain).velocity - chord) * mass;
+        }
     }
 
     /// The flight of a grain as it is at its local time: without forces the stored one.
