@@ -140,6 +140,8 @@ pub struct Encounters<S: Surface = NoSurface, C: Calendar = Tournament> {
     horizon: f64,
     /// Accelerations of the grains, m/s²; empty where none acts. Then the flights are chords ([`Bend`]) and the epoch is a sub-step.
     accelerations: Vec<Vector3<f64>>,
+    /// How far chords depart from paths, m.
+    sag: f64,
     /// Cells crossed since their layout was last thought over.
     crossings: usize,
     /// Neighbours looked at since then.
@@ -181,6 +183,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             vacant: Vec::new(),
             horizon: f64::INFINITY,
             accelerations: Vec::new(),
+            sag: 0.0,
             crossings: 0,
             looks: 0,
         }
@@ -374,17 +377,19 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
 
     /// Starts a new sub-step like an epoch. `kick` is given the surface, all grains that are nearer to each other than `reach` (m), and all
     /// flights, as they are at that moment, to change their velocities (m/s) to those of the chords, and their accelerations (m/s²) to set; a
-    /// grain that has been taken out has the radius 0. It gives the length of the sub-step (s).
+    /// grain that has been taken out has the radius 0. It gives the length of the sub-step (s) and
+    /// how far chords depart from paths in it (m): by so much grains that touch may overlap, beyond [`YIELDING`], before they meet again.
     pub fn start_sub_step(
         &mut self,
         duration: f64,
         reach: f64,
-        kick: impl FnOnce(&S, &[Touch], &mut [Flight], &mut [Vector3<f64>]) -> f64,
+        kick: impl FnOnce(&S, &[Touch], &mut [Flight], &mut [Vector3<f64>]) -> (f64, f64),
     ) {
         self.halt(duration);
         self.accelerations.resize(self.flights.len(), Vector3::zeros());
         let touches = self.touches(reach);
-        let next = kick(&self.surface, &touches, &mut self.flights, &mut self.accelerations);
+        let next;
+        (next, self.sag) = kick(&self.surface, &touches, &mut self.flights, &mut self.accelerations);
         self.resume(next);
     }
 
@@ -612,8 +617,8 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     fn search(&self, grain: u32) -> Search<'_> {
         let (flight, plan) = (self.flights[grain as usize], &self.plans[grain as usize]);
         let until = plan.pair.time.min(plan.side.time).min(self.horizon);
-        let under_force = !self.accelerations.is_empty();
-        Search { grain, flight, until, under_force, flights: &self.flights, plans: &self.plans, best: plan.pair, looks: 0 }
+        let sag = (!self.accelerations.is_empty()).then_some(self.sag);
+        Search { grain, flight, until, sag, flights: &self.flights, plans: &self.plans, best: plan.pair, looks: 0 }
     }
 
     /// Puts a meeting into the plans of both grains, and leaves the one that `grain` or its new partner had in mind before.
@@ -679,8 +684,8 @@ struct Search<'a> {
     flight: Flight,
     /// Later meetings do not count, s.
     until: f64,
-    /// Whether grains press against each other.
-    under_force: bool,
+    /// How far chords depart from paths (m), where grains press against each other.
+    sag: Option<f64>,
     flights: &'a [Flight],
     plans: &'a [Plan],
     /// The best so far.
@@ -700,8 +705,8 @@ impl Search<'_> {
         if !spheres_may_touch(&self.flight, theirs, shift, self.until) {
             return;
         }
-        let met = if self.under_force {
-            let slack = YIELDING * self.flight.radius.min(theirs.radius);
+        let met = if let Some(sag) = self.sag {
+            let slack = YIELDING * self.flight.radius.min(theirs.radius) + sag;
             sphere_sphere_yielding(&self.flight, theirs, shift, slack)
         } else {
             sphere_sphere(&self.flight, theirs, shift)
