@@ -30,6 +30,8 @@ const CLOSING_PULL: f64 = 0.01;
 const UNNOTICED: f64 = 0.25 * YIELDING;
 /// The same as parts of the largest acceleration, between which the rule above is kept: rounding, and what is a force at all.
 const ACCURACY: [f64; 2] = [1e-6, 1e-2];
+/// Where much is to be changed, sweeps stop at this part of what the first one changed: among grains that still collide, nobody notices the rest.
+const ENOUGH: f64 = 0.02;
 /// Approach, as a part of what the strongest force gives in a sub-step, that contacts at rest may keep: what `CLOSING_PULL` ends in the next one.
 const SETTLED: f64 = CLOSING_PULL;
 /// Sweeps at the most; what is left then is closed at the kicks to come, and by events.
@@ -392,7 +394,7 @@ fn energy(grains: &[Grain], flights: &[Flight]) -> f64 {
 /// gradient method (Silcowitz, Niebe & Erleben 2010), which needs about as many sweeps as the pile has layers; each sweep ends with forces
 /// that are allowed.
 fn sweep(contacts: &mut [Contact], movers: &mut [Mover], least: f64) {
-    let mut before = 0.0;
+    let (mut before, mut least) = (0.0, least);
     for number in 0..SWEEPS {
         let (mut largest, mut sum) = (0f64, 0.0);
         for contact in contacts.iter_mut() {
@@ -403,6 +405,9 @@ fn sweep(contacts: &mut [Contact], movers: &mut [Mover], least: f64) {
             let size = change.norm_squared();
             largest = largest.max(size / (contact.mass * contact.mass));
             sum += size;
+        }
+        if number == 0 {
+            least = least.max(ENOUGH * largest.sqrt());
         }
         if largest <= least * least || number + 1 == SWEEPS {
             return;

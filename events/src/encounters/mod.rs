@@ -90,6 +90,8 @@ pub struct Encounters<S: Surface = NoSurface, C: Calendar = Tournament> {
     under_force: bool,
     /// Accelerations of the grains, m/s²; empty where no force acts.
     accelerations: Vec<Vector3<f64>>,
+    /// How far chords depart from paths, m.
+    sag: f64,
     /// Cells crossed since their layout was last thought over.
     crossings: usize,
     /// Neighbours looked at since then.
@@ -132,6 +134,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             horizon: f64::INFINITY,
             under_force: false,
             accelerations: Vec::new(),
+            sag: 0.0,
             crossings: 0,
             looks: 0,
         }
@@ -479,7 +482,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             grain,
             flight,
             until,
-            under_force: self.under_force,
+            sag: self.under_force.then_some(self.sag),
             horizon: self.horizon,
             flights: &self.flights,
             plans: &self.plans,

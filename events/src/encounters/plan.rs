@@ -59,8 +59,8 @@ pub(super) struct Search<'a> {
     pub(super) flight: Flight,
     /// Later meetings do not count, s.
     pub(super) until: f64,
-    /// Whether grains press against each other.
-    pub(super) under_force: bool,
+    /// How far chords depart from paths (m), where grains press against each other.
+    pub(super) sag: Option<f64>,
     /// End of the sub-step, s.
     pub(super) horizon: f64,
     pub(super) flights: &'a [Flight],
@@ -82,8 +82,8 @@ impl Search<'_> {
         if !spheres_may_touch(&self.flight, theirs, shift, self.until) {
             return;
         }
-        let met = if self.under_force {
-            let slack = YIELDING * self.flight.radius.min(theirs.radius);
+        let met = if let Some(sag) = self.sag {
+            let slack = YIELDING * self.flight.radius.min(theirs.radius) + sag;
             sphere_sphere_yielding(&self.flight, theirs, shift, slack, self.horizon)
         } else {
             sphere_sphere(&self.flight, theirs, shift)

@@ -47,18 +47,20 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
 
     /// Starts a new sub-step like an epoch. `kick` is given the surface, all grains that are nearer to each other than `reach` (m), and all
     /// flights, as they are at that moment, to change their velocities (m/s) to those of the chords, and their accelerations (m/s²) to set; a
-    /// grain that has been taken out has the radius 0. It gives the length of the sub-step (s).
+    /// grain that has been taken out has the radius 0. It gives the length of the sub-step (s), and
+    /// how far chords depart from paths in it (m): by so much grains that touch may overlap, beyond [`YIELDING`](crate::YIELDING), before they meet again.
     pub fn start_sub_step(
         &mut self,
         duration: f64,
         reach: f64,
-        kick: impl FnOnce(&S, &[Touch], &mut [Flight], &mut [Vector3<f64>]) -> f64,
+        kick: impl FnOnce(&S, &[Touch], &mut [Flight], &mut [Vector3<f64>]) -> (f64, f64),
     ) {
         self.halt(duration);
         self.under_force = true;
         self.accelerations.resize(self.flights.len(), Vector3::zeros());
         let touches = self.touches(reach);
-        let next = kick(&self.surface, &touches, &mut self.flights, &mut self.accelerations);
+        let next;
+        (next, self.sag) = kick(&self.surface, &touches, &mut self.flights, &mut self.accelerations);
         self.resume(next);
     }
 

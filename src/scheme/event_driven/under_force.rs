@@ -105,7 +105,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let (grains, mut length, mut strongest) = (&mut self.grains, 0.0, 0.0);
         self.encounters.start_sub_step(after, under.reach, |surface, touches, flights, accelerations| {
             (length, strongest) = kick(surface, touches, grains, flights, accelerations);
-            length
+            (length, 0.125 * strongest * length * length)
         });
         self.force.resting_speed = STICKING * strongest * length;
         let sticks = self.laws.grain.restitution < 1.0;
