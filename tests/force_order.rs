@@ -59,7 +59,7 @@ fn plain_split(scene: &Scene, step: f64, until: f64) -> Vec<(Flight, Grain)> {
         // The half kick that ends the sub-step before, and the one that starts this one.
         grains.start_sub_step(if half_before > 0.0 { step } else { 0.0 }, 0.0, |_, _, flights, _| {
             kick(flights, half_before + 0.5 * step);
-            step
+            (step, 0.0)
         });
         half_before = 0.5 * step;
         while let Some((_, encounter)) = grains.next_before(step) {

@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use cpu_time::ProcessTime;
 use impinge::output::{self, Folder, Recorder};
-use impinge::scheme::Broken;
+use impinge::scheme::{Broken, LARGEST_OVERLAP_WITH_FORCES};
 use impinge::simulation::Simulation;
 use impinge::source::Nozzle;
 use miette::{Report, miette};
@@ -67,6 +67,9 @@ pub(super) fn run(args: &Args) -> Result<Ending, Failure> {
                     "shorten the sub-step, or give grains that attract each other a radius that keeps them apart"
                 }
                 Broken::OutOfPlane { .. } => "give the scene a surface that does not change along y",
+                Broken::Overlap { allowed, .. } if allowed == LARGEST_OVERLAP_WITH_FORCES => {
+                    "take a shorter `substep`: the overlap of grains under unequal forces goes with its square"
+                }
                 Broken::Overlap { .. } | Broken::NotANumber { .. } => "please report the scene",
             };
             let help = format!("{remedy}; what was measured until then is in {}", kept.display());

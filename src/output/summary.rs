@@ -206,6 +206,9 @@ pub struct Momentum {
     pub gravity: Option<[f64; 3]>,
 }
 
+/// Energies below this part of the largest one are rounding and not shown on the terminal.
+const ROUNDING: f64 = 1e-15;
+
 /// How the sub-steps of a run with forces went.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SubStepping {
@@ -430,7 +433,12 @@ impl Summary {
             ("potential at the end", forces.and_then(|forces| forces.potential_final).unwrap_or(0.0)),
         ];
         writeln!(f, "energy")?;
-        lines.into_iter().filter(|line| line.1 != 0.0).try_for_each(|line| self.energy_line(f, line.0, line.1, ""))?;
+        // What is only rounding of the others is none.
+        let least = ROUNDING * lines.iter().map(|line| line.1.abs()).fold(0.0, f64::max);
+        lines
+            .into_iter()
+            .filter(|line| line.1.abs() > least)
+            .try_for_each(|line| self.energy_line(f, line.0, line.1, ""))?;
         writeln!(f)
     }
 
