@@ -64,7 +64,8 @@ fn books_close_where_grains_enter_and_leave_under_gravity() {
     let ledger = &observers.1;
     assert!(ledger.entered().count() > 2000 && ledger.left().count() > 1000, "{:?}", ledger.left().count());
     assert!(observers.0.grain_hits() > 500 && observers.0.surface_hits() > 1000);
-    let residuals = [ledger.relative_mass_residual(), ledger.relative_energy_residual(), ledger.relative_momentum_residual()];
+    let residuals =
+        [ledger.relative_mass_residual(), ledger.relative_energy_residual(), ledger.relative_momentum_residual()];
     assert!(residuals.iter().all(|it| it.abs() < 1e-12), "{residuals:?}");
 }
 

@@ -54,7 +54,8 @@ fn two_behind_each_other(e: f64, gravity: f64) -> Scene {
 /// the last of 297 hits are slower than 1e-100 m/s, those below the slack of contacts under force are missed, and nothing is lost with them.
 #[test]
 fn case_3_sub_steps_without_force_change_no_hit() {
-    for (e, hits) in [(0.2, Some((4, 5))), (0.25, Some((3, 3))), (0.3, Some((2, 3))), (0.1716, None), (0.171_58, None)] {
+    for (e, hits) in [(0.2, Some((4, 5))), (0.25, Some((3, 3))), (0.3, Some((2, 3))), (0.1716, None), (0.171_58, None)]
+    {
         let scene = two_behind_each_other(e, 0.0);
         let stepped = scene.run(0.25, 40.0);
         let mut free: EventDriven<common::Plane> =
@@ -159,8 +160,7 @@ fn long_run(scene: &Scene, step: f64, until: f64, hits: usize) -> (f64, [f64; 2]
 /// sub-step, and does not drift in it.
 #[test]
 fn case_20_energy_of_two_grains_stays_in_its_band() {
-    let grains = [(-0.525, 0.02), (0.525, -0.02)]
-        .map(|(x, vy)| grain(Vector3::x() * x, Vector3::y() * vy, 0.5, 1.0));
+    let grains = [(-0.525, 0.02), (0.525, -0.02)].map(|(x, vy)| grain(Vector3::x() * x, Vector3::y() * vy, 0.5, 1.0));
     let scene = Scene { near_field: Some(attraction(1.0)), ..Scene::of(grains.into()) };
     let [(coarse, drift), (fine, fine_drift)] = [0.02, 0.01].map(|step| long_run(&scene, step, 7000.0, 10_000));
     eprintln!("{coarse:e} {drift:?} {fine:e} {fine_drift:?}");

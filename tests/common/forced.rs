@@ -41,7 +41,14 @@ impl Scene {
     /// Grains that nothing pulls and that bounce off each other without loss.
     pub fn of(grains: Vec<NewGrain>) -> Self {
         let domain = Domain::unbounded();
-        Self { grains, surface: Vec::new(), domain, laws: smooth(1.0, 1.0), gravity: Vector3::zeros(), near_field: None }
+        Self {
+            grains,
+            surface: Vec::new(),
+            domain,
+            laws: smooth(1.0, 1.0),
+            gravity: Vector3::zeros(),
+            near_field: None,
+        }
     }
 
     /// The scene, not yet begun.
@@ -82,9 +89,8 @@ pub fn look(run: &mut Substepped<Surface>, time: f64, observer: &mut impl Observ
 
 /// All grains at `time` (s), to which the run has been advanced.
 pub fn states(run: &Substepped<Surface>, time: f64) -> Vec<(Flight, Grain)> {
-    run.engine().snapshot(time, |snapshot| {
-        snapshot.flights.iter().copied().zip(snapshot.grains.iter().copied()).collect()
-    })
+    run.engine()
+        .snapshot(time, |snapshot| snapshot.flights.iter().copied().zip(snapshot.grains.iter().copied()).collect())
 }
 
 /// The law of PHYSICS section 5, F = -1/x² + 0.5/x³ (N), times `strength`: at contact, x = 1 m, it attracts.
