@@ -97,3 +97,81 @@ impl Lists {
         &self.others[self.starts[grain] as usize..self.starts[grain + 1] as usize]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use rand::{RngExt as _, SeedableRng as _};
+
+    use super::*;
+    use crate::Domain;
+
+    /// Grains of radii up to 1 m in a box of `side` (m), in a stream of `drift` (m/s).
+    fn scene(seed: u64, count: usize, side: f64, drift: Vector3<f64>) -> Vec<Flight> {
+        let mut random = rand_pcg::Pcg64::seed_from_u64(seed);
+        let mut within = |most: f64| Vector3::from_fn(|_, _| random.random_range(-most..most));
+        (0..count)
+            .map(|k| {
+                let position = within(0.5 * side).add_scalar(0.5 * side);
+                let radius = 1.0 - 0.6 * (k % 5) as f64 / 4.0;
+                Flight { position, time: 0.0, velocity: drift + within(1.0), radius }
+            })
+            .collect()
+    }
+
+    proptest! {
+        /// Whoever touches while lists hold, in any of several sub-steps, is in them, with the image that it touches.
+        #[test]
+        fn lists_name_all_who_touch(
+            seed: u64, count in 2..60usize, side in 9.0..20.0f64, periodic: bool, skin in 0.05..1.0f64, drift in -50.0..50.0f64,
+        ) {
+            let (min, max) = (Vector3::zeros(), Vector3::repeat(side));
+            let domain = if periodic { Domain { min, max, periodic, planar: false } } else { Domain::unbounded() };
+            let mut flights = scene(seed, count, side, Vector3::new(drift, 0.3 * drift, 0.0));
+            let Some(mut cells) = Cells::with_skin(domain, 1.0, skin, &flights, 0.0) else {
+                // The periodic domain is too small for the skin.
+                prop_assert!(periodic && side < 4.0 * (2.0 + skin) * 1.001);
+                return Ok(());
+            };
+            (0..).zip(&flights).for_each(|(grain, flight)| cells.insert(grain, flight, 0.0));
+            let mut lists = Lists::new(&cells, &flights, skin);
+            let step = skin / 16.0;
+            for _ in 0..8 {
+                let held: Vec<bool> = (0..).zip(&flights).map(|(k, flight)| lists.holds(k, flight, step)).collect();
+                for (a, ours) in flights.iter().enumerate() {
+                    for (b, theirs) in flights.iter().enumerate().filter(|&(b, _)| b != a && held[a] && held[b]) {
+                        for part in 0..=4 {
+                            let time = step * f64::from(part) / 4.0;
+                            let apart = theirs.position_at(time) - ours.position_at(time);
+                            let nearest = domain.nearest(apart);
+                            if nearest.norm() <= ours.radius + theirs.radius {
+                                let listed = lists.of(a as u32).iter().find(|&&(other, _)| other as usize == b);
+                                let Some((_, shift)) = listed else { panic!("{b} is not in the list of {a}") };
+                                prop_assert!((apart + shift - nearest).norm() < 1e-9, "another image of {b}");
+                            }
+                        }
+                    }
+                }
+                flights.iter_mut().for_each(|flight| {
+                    *flight = flight.advanced_to(step);
+                    flight.time = 0.0;
+                });
+                lists.age(step);
+            }
+        }
+    }
+
+    /// A grain that leaves its room, or has left it, is not held.
+    #[test]
+    fn a_list_holds_as_long_as_its_grain_keeps_to_its_room() {
+        let flights = scene(1, 2, 9.0, Vector3::zeros());
+        let mut cells = Cells::with_skin(Domain::unbounded(), 1.0, 0.5, &flights, 0.0).expect("cells");
+        (0..).zip(&flights).for_each(|(grain, flight)| cells.insert(grain, flight, 0.0));
+        let lists = Lists::new(&cells, &flights, 0.5);
+        let drift = 0.5 * (flights[0].velocity + flights[1].velocity);
+        let with = |speed: f64| Flight { velocity: drift + Vector3::x() * speed, ..flights[0] };
+        assert!(lists.holds(0, &with(0.24), 1.0) && !lists.holds(0, &with(0.26), 1.0));
+        let astray = Flight { position: flights[0].position + Vector3::x() * 0.3, ..with(-0.3) };
+        assert!(!lists.holds(0, &astray, 1.0));
+    }
+}

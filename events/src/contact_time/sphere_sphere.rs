@@ -83,13 +83,16 @@ pub fn spheres_may_touch(a: &Flight, b: &Flight, shift: Vector3<f64>, until: f64
     let separation = r.norm_squared() - s * s;
     // r² - s² falls by less than 2 approach t within t.
     let in_time = separation <= 2.0 * approach * (until - a.time) + CAUTION * (separation.abs() + s * s);
-    let on_course = v2 * separation <= approach * approach + CAUTION * s * s * v2;
+    // Of a pair far apart both sides are much larger than their difference.
+    let on_course = v2 * separation <= approach * approach * (1.0 + FAR_CAUTION) + CAUTION * s * s * v2;
     // Where squares of speeds underflow nothing is known.
     in_time & on_course | (v2 < SMALLEST_SPEED_SQUARED)
 }
 
-/// What rounding may do to a bound, relative: much more than it does, and too little to let many pairs pass.
-const CAUTION: f64 = 1e-9;
+/// What rounding may do to a bound, relative: much more than it does (as far as 1e9 radii from the origin), and too little to let many pairs pass.
+const CAUTION: f64 = 1e-6;
+/// What it may do to a square of distances, relative.
+const FAR_CAUTION: f64 = 1.0 / (1u64 << 46) as f64;
 
 /// Below this relative speed squared ((1e-140 m/s)²) the products of the root would underflow.
 const SMALLEST_SPEED_SQUARED: f64 = 1e-280;
