@@ -7,6 +7,7 @@ use impinge_events::{Domain, Encounter, Encounters, Flight, Surface, SurfaceCont
 use nalgebra::Vector3;
 use rustc_hash::FxHashSet;
 
+use super::resting::PAIR_REST;
 use super::{Broken, GrainCollision, Observer, Passage, Progress, SurfaceHit};
 use crate::grains::{Grain, NewGrain, Snapshot};
 use crate::near_field::Singular;
@@ -301,7 +302,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         });
         self.resting_speed = STICKING * strongest * length;
         let sticks = self.laws.grain.restitution < 1.0;
-        self.resting_speed_of_pairs = if sticks { strongest * length } else { self.resting_speed };
+        self.resting_speed_of_pairs = if sticks { PAIR_REST * strongest * length } else { self.resting_speed };
         self.anchors.clear();
         self.synchronised.clear();
         if under.near_field.is_some() {
