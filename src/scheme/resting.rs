@@ -17,25 +17,28 @@ use crate::law::{ContactLaw, Friction};
 pub(super) const PAIR_REACH: f64 = 1e-6;
 /// A grain that rests on the surface does so to rounding: a bounce, low as it be, is resolved.
 const SURFACE_REACH: f64 = 1e-9;
-/// Two grains are at rest against each other when they approach or part slower than this part of what the force gives in a sub-step.
-const PAIR_REST: f64 = 1.0;
+/// Two grains are at rest against each other when they approach or part slower than this many times what the force gives in a sub-step. Their
+/// energy of approach is then of the second order in the sub-step, as its other errors are; a pile comes to rest at half the cost of 1.
+pub(super) const PAIR_REST: f64 = 4.0;
 /// The same for a grain and the surface.
 const SURFACE_REST: f64 = 1e-3;
 /// Part of the gap, or of the overlap, of a contact at rest that is closed in a sub-step, so that rounding and unfinished sweeps do not add up.
 const CLOSING: f64 = 0.1;
-/// Closing takes no more than this part of the largest acceleration.
+/// Closing takes no more than this part of the largest acceleration,
 const CLOSING_PULL: f64 = 0.01;
+/// and to end the approach of the kick before no more than this one: the rest is ended at once ([`Resting::settle`]).
+const BRAKING: f64 = 0.1;
 /// Sweeps stop when no contact changes its acceleration by more than would, by the time that `CLOSING` makes up for it, open or close a gap of
 /// this part of the smallest radius: a quarter of what contacts yield before events look after them.
 const UNNOTICED: f64 = 0.25 * YIELDING;
 /// The same as parts of the largest acceleration, between which the rule above is kept: rounding, and what is a force at all.
 const ACCURACY: [f64; 2] = [1e-6, 1e-2];
 /// Where much is to be changed, sweeps stop at this part of what the first one changed: among grains that still collide, nobody notices the rest.
-const ENOUGH: f64 = 0.02;
-/// Approach, as a part of what the strongest force gives in a sub-step, that contacts at rest may keep: what `CLOSING_PULL` ends in the next one.
-const SETTLED: f64 = CLOSING_PULL;
+const ENOUGH: f64 = 0.1;
+/// Approach, as a part of what the strongest force gives in a sub-step, that contacts at rest may keep: what `BRAKING` ends in the next one.
+const SETTLED: f64 = BRAKING;
 /// Sweeps at the most; what is left then is closed at the kicks to come, and by events.
-const SWEEPS: u32 = 100;
+const SWEEPS: u32 = 40;
 /// The surface in place of a first grain, whatever their number.
 const SURFACE: u32 = u32::MAX;
 
@@ -276,7 +279,7 @@ impl Resting {
         let smallest =
             flights.iter().map(|flight| flight.radius).filter(|&radius| radius > 0.0).fold(f64::INFINITY, f64::min);
         self.order(flights, pull.iter().sum());
-        self.aim(grains, flights, step, CLOSING_PULL * largest);
+        self.aim(grains, flights, step, largest);
         self.move_with(grains, flights, |slot| (pull[slot], Vector3::zeros()));
         for contact in &self.contacts {
             contact.push(&mut self.movers, contact.force);
@@ -316,12 +319,14 @@ impl Resting {
     }
 
     /// Says for all contacts at which rate the gap should close and how much slip should end, at the velocities of `flights`.
-    fn aim(&mut self, grains: &[Grain], flights: &[Flight], step: f64, most: f64) {
+    fn aim(&mut self, grains: &[Grain], flights: &[Flight], step: f64, largest: f64) {
+        let (most_closing, most) = (CLOSING_PULL * largest * step, BRAKING * largest);
         self.move_with(grains, flights, |slot| (flights[slot].velocity, grains[slot].spin * flights[slot].radius));
         for contact in &mut self.contacts {
             let rate = contact.rate(&self.movers) - contact.velocity;
             let along = rate.dot(&contact.normal);
-            contact.closing = ((-CLOSING * contact.gap / step - along) / step).clamp(-most, most);
+            let closing = (-CLOSING * contact.gap / step).clamp(-most_closing, most_closing);
+            contact.closing = ((closing - along) / step).clamp(-most, most);
             contact.slipping = (rate - contact.normal * along) / step;
         }
     }

@@ -10,6 +10,7 @@ use crate::grains::Grain;
 use crate::law::{Body, External, NearField};
 use crate::near_field::Singular;
 use crate::scheme::Broken;
+use crate::scheme::resting::PAIR_REST;
 
 /// A contact under force whose approach speed is below this part of what the force gives in a sub-step has come to rest. A bouncing grain then
 /// comes to rest early by this part of a sub-step over 1 - e.
@@ -109,7 +110,8 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         });
         self.force.resting_speed = STICKING * strongest * length;
         let sticks = self.laws.grain.restitution < 1.0;
-        self.force.resting_speed_of_pairs = if sticks { strongest * length } else { self.force.resting_speed };
+        self.force.resting_speed_of_pairs =
+            if sticks { PAIR_REST * strongest * length } else { self.force.resting_speed };
         self.force.anchors.clear();
         self.force.synchronised.clear();
         self.force.supported.clear();
