@@ -88,7 +88,8 @@ fn the_plain_split_step_is_of_first_order() {
 
 /// Grains at these places (m) with these velocities (m/s) and spins (rad/s), of unequal sizes and masses.
 fn some_grains(given: &[([f64; 3], [f64; 3], [f64; 3])]) -> Vec<NewGrain> {
-    let one = |(number, (place, velocity, spin)): (usize, &([f64; 3], [f64; 3], [f64; 3]))| {
+    let one = |(number, given): (usize, &_)| {
+        let (place, velocity, spin): &([f64; 3], [f64; 3], [f64; 3]) = given;
         let size = 1.0 + 0.1 * number as f64;
         let spin = Vector3::from(*spin);
         NewGrain { spin, ..grain((*place).into(), (*velocity).into(), 0.4 * size, size.powi(3)) }

@@ -101,7 +101,7 @@ impl Lists {
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
-    use rand::{RngExt as _, SeedableRng as _};
+    use rand::SeedableRng as _;
 
     use super::*;
     use crate::Domain;

@@ -170,6 +170,7 @@ impl Resting {
 
     /// Finds the contacts at rest. `flights` are at their places, with the velocities of their chords of the sub-step before, and `pull` (m/s²) is
     /// what acts on each grain now.
+    #[expect(clippy::too_many_arguments, reason = "all of them say where contacts can be")]
     pub(super) fn find<S: Surface>(
         &mut self,
         surface: &S,

@@ -314,7 +314,7 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
     /// Chooses the length of the next sub-steps.
     fn choose_step(&mut self) -> Result<(), Broken> {
         let Length::Within(tolerance) = self.length else { return Ok(()) };
-        if self.steps % STEPS_PER_CHECK != 0 {
+        if !self.steps.is_multiple_of(STEPS_PER_CHECK) {
             return Ok(());
         }
         let longest = self.longest_step()?;
