@@ -95,7 +95,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (reference, _) = run(&scene, &folder, halved(HALVINGS + 4))?;
 
     println!("{:>14} {:>14} {:>8} {:>18} {:>8}", "sub-step, s", "error, m", "order", "ledger residual", "order");
-    let (mut errors, mut residuals): (Vec<(f64, f64)>, Vec<(f64, f64)>) = Default::default();
+    let (mut errors, mut residuals) = (Vec::<(f64, f64)>::new(), Vec::<(f64, f64)>::new());
     for halving in 0..=HALVINGS {
         let (mut error, mut residual) = (0.0, 0.0);
         for neighbour in 0..NEIGHBOURS {
