@@ -189,6 +189,8 @@ pub struct EventDriven<S: Surface, C: Calendar = Tournament> {
     resting_speed_of_pairs: f64,
     /// Where the grains were at the last kick, m; empty without a near field.
     anchors: Vec<Vector3<f64>>,
+    /// Which grains touched others at the last kick.
+    touching: Vec<bool>,
     /// Pairs whose accelerations are those of their contact already.
     synchronised: FxHashSet<[u32; 2]>,
     /// What contacts at rest did since it was last asked.
@@ -235,6 +237,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             resting_speed: 0.0,
             resting_speed_of_pairs: 0.0,
             anchors: Vec::new(),
+            touching: Vec::new(),
             synchronised: FxHashSet::default(),
             held: Held::default(),
             holds_left: u64::MAX,
@@ -296,7 +299,14 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.natural_epoch(after);
         self.forces = true;
         let (grains, mut length, mut strongest) = (&mut self.grains, 0.0, 0.0);
+        let touching = &mut self.touching;
+        touching.clear();
+        touching.resize(grains.len(), false);
         self.encounters.start_sub_step(after, under.reach, |surface, touches, flights, accelerations| {
+            for touch in touches {
+                touching[touch.a as usize] = true;
+                touching[touch.b as usize] = true;
+            }
             (length, strongest) = kick(surface, touches, grains, flights, accelerations);
             (length, 0.125 * strongest * length * length)
         });
@@ -667,7 +677,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
 
     /// Approach speed (m/s) below which a grain has come to rest against the surface.
     fn resting_speed_at_surface(&self, grain: u32) -> f64 {
-        let among_grains = self.rows.get(grain as usize).is_some_and(|row| row.among_grains());
+        let grain = grain as usize;
+        let among_grains =
+            self.touching.get(grain) == Some(&true) || self.rows.get(grain).is_some_and(|row| row.among_grains());
         if among_grains { self.resting_speed_of_pairs } else { self.resting_speed }
     }
 
