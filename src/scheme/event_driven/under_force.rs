@@ -75,6 +75,8 @@ pub(super) struct UnderForce {
     pub(super) resting_speed_of_pairs: f64,
     /// Where the grains were at the last kick, m; empty without a near field.
     anchors: Vec<Vector3<f64>>,
+    /// Which grains touched others at the last kick.
+    touching: Vec<bool>,
     /// Pairs whose accelerations are those of their contact already.
     synchronised: FxHashSet<[u32; 2]>,
     /// Grains that the surface carries since they came to rest on it in this sub-step.
@@ -104,7 +106,14 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.natural_epoch(after);
         self.force.acts = true;
         let (grains, mut length, mut strongest) = (&mut self.grains, 0.0, 0.0);
+        let touching = &mut self.force.touching;
+        touching.clear();
+        touching.resize(grains.len(), false);
         self.encounters.start_sub_step(after, under.reach, |surface, touches, flights, accelerations| {
+            for touch in touches {
+                touching[touch.a as usize] = true;
+                touching[touch.b as usize] = true;
+            }
             (length, strongest) = kick(surface, touches, grains, flights, accelerations);
             (length, 0.125 * strongest * length * length)
         });
@@ -222,7 +231,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
 
     /// Approach speed (m/s) below which a grain has come to rest against the surface.
     pub(super) fn resting_speed_at_surface(&self, grain: u32) -> f64 {
-        let among_grains = self.rows.get(grain as usize).is_some_and(|row| row.among_grains());
+        let grain = grain as usize;
+        let among_grains =
+            self.force.touching.get(grain) == Some(&true) || self.rows.get(grain).is_some_and(|row| row.among_grains());
         if among_grains { self.force.resting_speed_of_pairs } else { self.force.resting_speed }
     }
 
