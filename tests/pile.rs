@@ -218,7 +218,7 @@ fn the_near_field_presses_grains_to_an_agglomerate_that_stays_together() {
         contact.grain = { restitution = 0.3, friction = 0.4 }
         output = { samples = 41 }
         near_field = { alpha1 = 1e-5, beta1 = 2, alpha2 = 0, beta2 = 3, sum = \"direct\", substep = 1e-3 }
-        source = [{ kind = \"block\", min = [-0.05, -0.05, -0.05], max = [0.05, 0.05, 0.05], count = 60 }]";
+        source = [{ kind = \"block\", min = [-0.05, -0.05, -0.05], max = [0.05, 0.05, 0.05], count = 60, velocity = [0, 0, 0] }]";
     let watch = watch(scene);
     let rest = at_rest(&watch);
     // All grains are within a sphere of packing fraction 0.3.
@@ -233,7 +233,7 @@ fn the_near_field_presses_grains_to_an_agglomerate_that_stays_together() {
 #[test]
 fn light_grains_carry_a_heavy_one() {
     let mut scene = pile(60, 0.05, 0.3, 0.4, 5e-4, 2.0);
-    scene += "[[source]]\nkind = \"lattice\"\nmin = [0, 0, 0.3]\nmax = [0.01, 0.01, 0.31]\ncells = [1, 1, 1]\ndensity = 250000\n";
+    scene += "[[source]]\nkind = \"lattice\"\nmin = [0, 0, 0.3]\nmax = [0.01, 0.01, 0.31]\ncells = [1, 1, 1]\nvelocity = [0, 0, 0]\ndensity = 250000\n";
     let watch = watch(&scene);
     // It weighs a hundred grains.
     check(&watch, 5e-4, 100.0);

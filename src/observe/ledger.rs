@@ -198,6 +198,13 @@ impl Ledger {
         self.initial().energy() + self.entered.energy()
     }
 
+    /// The largest energy there was, J: E₀, or, where forces act, what grains had at a sample or got from a force, if that is more.
+    #[must_use]
+    pub fn largest_energy(&self) -> f64 {
+        let brought_in = self.energy_brought_in();
+        self.forces.as_ref().map_or(brought_in, |forces| brought_in.max(self.peak.1).max(forces.exchanged()))
+    }
+
     /// Mass that came in less mass that is accounted for, kg.
     #[must_use]
     pub fn mass_residual(&self) -> f64 {
