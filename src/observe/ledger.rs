@@ -198,11 +198,13 @@ impl Ledger {
         self.initial().energy() + self.entered.energy()
     }
 
-    /// The largest energy there was, J: E₀, or, where forces act, what grains had at a sample or got from a force, if that is more.
+    /// What energies of this run are measured by, J: E₀, or, where forces gave more than twice that, the largest energy that grains had at a sample or
+    /// got from a force.
     #[must_use]
-    pub fn largest_energy(&self) -> f64 {
+    pub fn energy_scale(&self) -> f64 {
         let brought_in = self.energy_brought_in();
-        self.forces.as_ref().map_or(brought_in, |forces| brought_in.max(self.peak.1).max(forces.exchanged()))
+        let largest = self.forces.as_ref().map_or(0.0, |forces| self.peak.1.max(forces.exchanged()));
+        if largest > 2.0 * brought_in { largest } else { brought_in }
     }
 
     /// Mass that came in less mass that is accounted for, kg.

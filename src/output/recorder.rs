@@ -168,7 +168,7 @@ impl Recorder {
     }
 
     fn write_pictures(&self) -> Result<(), Error> {
-        let (title, total) = (self.scene.title.as_str(), self.ledger.largest_energy());
+        let (title, total) = (self.scene.title.as_str(), self.ledger.energy_scale());
         let pictures = [
             ("energy_history.svg", plots::energy_history(title, &self.history, &self.ledger)),
             ("jet_side.svg", self.side_view.picture(title, &self.shape)),

@@ -12,6 +12,9 @@ use crate::scene::{Interference, Scene, Scheme};
 /// Hit orders listed in the summary; `surface_hits.csv` has them all.
 const LISTED_ORDERS: usize = 20;
 
+/// Energies below this part of their scale are rounding, and not shown on the terminal.
+const ROUNDING: f64 = 1e-14;
+
 /// From so many collisions on the time for each of them is worth a word.
 const MANY_COLLISIONS: u64 = 10_000;
 
@@ -122,6 +125,9 @@ pub struct Energy {
     /// What forces and resting contacts did; absent where no force acts.
     #[serde(flatten)]
     pub forces: Option<ForceEnergy>,
+    /// What energies are measured by: brought in, or given by forces where that is more.
+    #[serde(skip)]
+    pub scale: f64,
     /// What is not accounted for.
     pub residual: f64,
     /// The residual over the energy brought in, or over the largest energy that grains had or got from a force, if that is more.
@@ -265,6 +271,7 @@ impl Summary {
                     work_gravity: forces.work_gravity(),
                     rest_added: forces.rest_added(),
                 }),
+                scale: ledger.energy_scale(),
                 residual: ledger.energy_residual(),
                 residual_relative: ledger.relative_energy_residual(),
             },
@@ -384,7 +391,9 @@ impl Summary {
             ("potential at the end", forces.and_then(|forces| forces.potential_final).unwrap_or(0.0)),
         ];
         writeln!(f, "energy")?;
-        lines.into_iter().filter(|line| line.1 != 0.0).try_for_each(|line| self.energy_line(f, line.0, line.1, ""))?;
+        // What is rounding beside the rest is none.
+        let least = ROUNDING * energy.scale;
+        lines.into_iter().filter(|line| line.1.abs() > least).try_for_each(|line| self.energy_line(f, line.0, line.1, ""))?;
         writeln!(f)
     }
 
@@ -430,7 +439,8 @@ impl Summary {
 
     fn energy_line(&self, f: &mut fmt::Formatter<'_>, name: &str, energy: f64, note: &str) -> fmt::Result {
         let total = self.brought_in();
-        let part = if total > 0.0 { format!("{:>8.2} %", 100.0 * energy / total) } else { String::new() };
+        // Parts of what was brought in say nothing where forces gave more.
+        let part = if total > 0.0 && total == self.energy.scale { format!("{:>8.2} %", 100.0 * energy / total) } else { String::new() };
         writeln!(f, "  {name:<26}{:>12}{part}{note}", quantity(energy, "J"))
     }
 }

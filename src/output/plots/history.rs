@@ -15,8 +15,8 @@ const KEY: i32 = 665;
 
 /// Potential energies, less what they were at the start.
 const POTENTIALS: [(&str, RGBColor, fn(&Moment) -> Option<f64>); 2] = [
-    ("near field", PURPLE, |moment| moment.near_field),
-    ("gravity", SKY, |moment| moment.gravity),
+    ("near-field potential", PURPLE, |moment| moment.near_field),
+    ("potential of gravity", SKY, |moment| moment.gravity),
 ];
 
 struct Curve {
@@ -32,14 +32,14 @@ impl Curve {
 }
 
 /// Draws the energy brought to the surface so far, the kinetic energy inside, and potential energies where forces act, over the energy E0: what was
-/// brought in, or the largest energy there was if forces gave more.
+/// brought in, or the most there was if forces gave more.
 ///
 /// # Errors
 /// None but those of drawing itself.
 pub fn energy_history(title: &str, history: &History, ledger: &Ledger) -> io::Result<Option<String>> {
     let moments = history.moments();
     let [first, .., last] = moments else { return Ok(None) };
-    let e0 = ledger.largest_energy();
+    let e0 = ledger.energy_scale();
     if e0 <= 0.0 || last.time <= first.time {
         return Ok(None);
     }
@@ -50,6 +50,7 @@ pub fn energy_history(title: &str, history: &History, ledger: &Ledger) -> io::Re
         points: moments.iter().map(|moment| (moment.time / time.factor, of(moment) / e0)).collect(),
     };
     let mut curves = vec![curve("kinetic energy inside", MUTED, |moment| moment.kinetic_energy)];
+    let potential = if last.gravity.is_some() { ", potential energy since the start" } else { "" };
     let mut shows = "Kinetic energy";
     if last.grain_surface > 0 {
         curves.push(curve("first hits", GREEN, |moment| moment.surface_first));
@@ -64,8 +65,8 @@ pub fn energy_history(title: &str, history: &History, ledger: &Ledger) -> io::Re
             curves.push(Curve { name, colour, points: moments.iter().filter_map(energy).collect() });
         }
     }
-    let what = if e0 > ledger.energy_brought_in() { "is the most there was at a time" } else { "brought in until the end" };
-    let shows = format!("{shows}; E0 = {} {what}", quantity(e0, "J"));
+    let what = if e0 > ledger.energy_brought_in() { "is the most that forces gave" } else { "brought in until the end" };
+    let shows = format!("{shows}{potential}; E0 = {} {what}", quantity(e0, "J"));
     picture(SIZE, title, &shows, |area| {
         draw_curves(area, &curves, &format!("time ({}s)", time.symbol))?;
         draw_key(area, curves)
