@@ -9,6 +9,10 @@ pub struct Moment {
     pub time: f64,
     /// Kinetic energy of the grains inside, J.
     pub kinetic_energy: f64,
+    /// Potential energy of the near field less that at the start, J; none where it is not summed.
+    pub near_field: Option<f64>,
+    /// Potential energy of gravity less that at the start, J: the work of gravity so far, with the other sign; none where no force acts.
+    pub gravity: Option<f64>,
     /// Energy brought to the surface so far by first hits, J.
     pub surface_first: f64,
     /// Energy brought to the surface so far by later hits, J.
@@ -36,9 +40,13 @@ pub struct History {
 impl History {
     /// Notes where the run stands; to be called after `ledger` and `surface` have seen the sample of `time` (s).
     pub fn note(&mut self, time: f64, ledger: &Ledger, surface: &SurfaceEnergy) {
+        let forces = ledger.forces();
+        let near_field = forces.and_then(|forces| Some(forces.potential_final()? - forces.potential_initial()?));
         self.moments.push(Moment {
             time,
             kinetic_energy: ledger.inside().energy(),
+            near_field,
+            gravity: forces.map(|forces| 0.0 - forces.work_gravity()),
             surface_first: surface.first_hits(),
             surface_repeated: surface.repeated_hits(),
             surface_all: surface.all_hits(),

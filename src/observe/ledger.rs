@@ -198,6 +198,15 @@ impl Ledger {
         self.initial().energy() + self.entered.energy()
     }
 
+    /// What energies of this run are measured by, J: E₀, or, where forces gave more than twice that, the largest energy that grains had at a sample or
+    /// got from a force.
+    #[must_use]
+    pub fn energy_scale(&self) -> f64 {
+        let brought_in = self.energy_brought_in();
+        let largest = self.forces.as_ref().map_or(0.0, |forces| self.peak.1.max(forces.exchanged()));
+        if largest > 2.0 * brought_in { largest } else { brought_in }
+    }
+
     /// Mass that came in less mass that is accounted for, kg.
     #[must_use]
     pub fn mass_residual(&self) -> f64 {

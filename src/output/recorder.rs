@@ -170,9 +170,9 @@ impl Recorder {
     }
 
     fn write_pictures(&self) -> Result<(), Error> {
-        let (title, total) = (self.scene.title.as_str(), self.ledger.energy_brought_in());
+        let (title, total) = (self.scene.title.as_str(), self.ledger.energy_scale());
         let pictures = [
-            ("energy_history.svg", plots::energy_history(title, &self.history, total)),
+            ("energy_history.svg", plots::energy_history(title, &self.history, &self.ledger)),
             ("jet_side.svg", self.side_view.picture(title, &self.shape)),
             ("energy_by_hit_order.svg", plots::energy_by_hit_order(title, &self.surface, total)),
             ("impacts.svg", plots::impacts(title, &self.map)),

@@ -13,6 +13,9 @@ use crate::scheme::SubSteps;
 /// Hit orders listed in the summary; `surface_hits.csv` has them all.
 const LISTED_ORDERS: usize = 20;
 
+/// Energies below this part of their scale are rounding, and not shown on the terminal.
+const ROUNDING: f64 = 1e-14;
+
 /// From so many collisions on the time for each of them is worth a word.
 const MANY_COLLISIONS: u64 = 10_000;
 
@@ -126,6 +129,9 @@ pub struct Energy {
     /// What forces and resting contacts did; absent where no force acts.
     #[serde(flatten)]
     pub forces: Option<ForceEnergy>,
+    /// What energies are measured by: brought in, or given by forces where that is more.
+    #[serde(skip)]
+    pub scale: f64,
     /// What is not accounted for.
     pub residual: f64,
     /// The residual over the energy brought in, or over the largest energy that grains had or got from a force, if that is more.
@@ -205,9 +211,6 @@ pub struct Momentum {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gravity: Option<[f64; 3]>,
 }
-
-/// Energies below this part of the largest one are rounding and not shown on the terminal.
-const ROUNDING: f64 = 1e-15;
 
 /// How the sub-steps of a run with forces went.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -313,6 +316,7 @@ impl Summary {
                     work_gravity: forces.work_gravity(),
                     rest_added: forces.rest_added(),
                 }),
+                scale: ledger.energy_scale(),
                 residual: ledger.energy_residual(),
                 residual_relative: ledger.relative_energy_residual(),
             },
@@ -433,8 +437,8 @@ impl Summary {
             ("potential at the end", forces.and_then(|forces| forces.potential_final).unwrap_or(0.0)),
         ];
         writeln!(f, "energy")?;
-        // What is only rounding of the others is none.
-        let least = ROUNDING * lines.iter().map(|line| line.1.abs()).fold(0.0, f64::max);
+        // What is rounding beside the rest is none.
+        let least = ROUNDING * energy.scale;
         lines
             .into_iter()
             .filter(|line| line.1.abs() > least)
@@ -486,9 +490,13 @@ impl Summary {
     }
 
     fn energy_line(&self, f: &mut fmt::Formatter<'_>, name: &str, energy: f64, note: &str) -> fmt::Result {
-        // Where forces act most of the energy may come from them, and E0 is no measure.
-        let total = if self.energy.forces.is_some() { 0.0 } else { self.brought_in() };
-        let part = if total > 0.0 { format!("{:>8.2} %", 100.0 * energy / total) } else { String::new() };
+        let total = self.brought_in();
+        // Parts of what was brought in say nothing where forces gave more.
+        let part = if total > 0.0 && total == self.energy.scale {
+            format!("{:>8.2} %", 100.0 * energy / total)
+        } else {
+            String::new()
+        };
         writeln!(f, "  {name:<26}{:>12}{part}{note}", quantity(energy, "J"))
     }
 }

@@ -43,9 +43,9 @@ pub(super) fn write_grains(out: &mut dyn Write, snapshot: &Snapshot<'_>) -> io::
     table(out, &[&HEADER[..], &["strength"]].concat(), rows.zip(strengths))
 }
 
-/// `series.csv`: the time history.
+/// `series.csv`: the time history, with potential energies (since the start) in two more columns where forces act.
 pub(super) fn write_series(out: &mut dyn Write, history: &History) -> io::Result<()> {
-    let header = [
+    const HEADER: [&str; 10] = [
         "time",
         "kinetic_energy",
         "surface_energy_first_hits",
@@ -63,7 +63,11 @@ pub(super) fn write_series(out: &mut dyn Write, history: &History) -> io::Result
         let counts = [moment.grain_grain, moment.grain_surface, moment.inside];
         (moment.time, moment.kinetic_energy, surface, dissipated, counts)
     });
-    table(out, &header, rows)
+    if history.moments().iter().all(|moment| moment.gravity.is_none()) {
+        return table(out, &HEADER, rows);
+    }
+    let potentials = history.moments().iter().map(|moment| [moment.near_field, moment.gravity]);
+    table(out, &[&HEADER[..], &["potential_near_field", "potential_gravity"]].concat(), rows.zip(potentials))
 }
 
 /// `surface_hits.csv`: energy to the surface by hit order.

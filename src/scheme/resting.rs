@@ -38,7 +38,7 @@ const ENOUGH: f64 = 0.1;
 /// Approach, as a part of what the strongest force gives in a sub-step, that contacts at rest may keep: what `BRAKING` ends in the next one.
 const SETTLED: f64 = BRAKING;
 /// Sweeps at the most; what is left then is closed at the kicks to come, and by events.
-const SWEEPS: u32 = 40;
+const SWEEPS: u32 = 20;
 /// The surface in place of a first grain, whatever their number.
 const SURFACE: u32 = u32::MAX;
 

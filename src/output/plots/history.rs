@@ -5,13 +5,21 @@ use std::io;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
-use super::{BLUE, Drawn, FAINT, FINE, GREEN, HEADING, INK, MUTED, ORANGE, fine, part, picture, style, tick, write};
-use crate::observe::{History, Moment};
+use super::{
+    BLUE, Drawn, FAINT, FINE, GREEN, HEADING, INK, MUTED, ORANGE, PURPLE, SKY, fine, part, picture, style, tick, write,
+};
+use crate::observe::{History, Ledger, Moment};
 use crate::output::summary::{Prefix, quantity};
 
 const SIZE: [i32; 2] = [900, 520];
 /// Where the key begins, right of the curves, pixels.
 const KEY: i32 = 665;
+
+/// Potential energies, less what they were at the start.
+const POTENTIALS: [(&str, RGBColor, fn(&Moment) -> Option<f64>); 2] = [
+    ("near-field potential", PURPLE, |moment| moment.near_field),
+    ("potential of gravity", SKY, |moment| moment.gravity),
+];
 
 struct Curve {
     name: &'static str,
@@ -25,23 +33,26 @@ impl Curve {
     }
 }
 
-/// Draws the energy brought to the surface so far and the kinetic energy inside, over the energy `brought_in` (J).
+/// Draws the energy brought to the surface so far, the kinetic energy inside, and potential energies where forces act, over the energy E0: what was
+/// brought in, or the most there was if forces gave more.
 ///
 /// # Errors
 /// None but those of drawing itself.
-pub fn energy_history(title: &str, history: &History, brought_in: f64) -> io::Result<Option<String>> {
+pub fn energy_history(title: &str, history: &History, ledger: &Ledger) -> io::Result<Option<String>> {
     let moments = history.moments();
     let [first, .., last] = moments else { return Ok(None) };
-    if brought_in <= 0.0 || last.time <= first.time {
+    let e0 = ledger.energy_scale();
+    if e0 <= 0.0 || last.time <= first.time {
         return Ok(None);
     }
     let time = Prefix::of(last.time.abs().max(first.time.abs()));
     let curve = |name, colour, of: fn(&Moment) -> f64| Curve {
         name,
         colour,
-        points: moments.iter().map(|moment| (moment.time / time.factor, of(moment) / brought_in)).collect(),
+        points: moments.iter().map(|moment| (moment.time / time.factor, of(moment) / e0)).collect(),
     };
     let mut curves = vec![curve("kinetic energy inside", MUTED, |moment| moment.kinetic_energy)];
+    let potential = if last.gravity.is_some() { ", potential energy since the start" } else { "" };
     let mut shows = "Kinetic energy";
     if last.grain_surface > 0 {
         curves.push(curve("first hits", GREEN, |moment| moment.surface_first));
@@ -49,7 +60,16 @@ pub fn energy_history(title: &str, history: &History, brought_in: f64) -> io::Re
         curves.push(curve("all hits", BLUE, |moment| moment.surface_all));
         shows = "Energy brought to the surface so far, and kinetic energy";
     }
-    let shows = format!("{shows}; E0 = {} brought in until the end", quantity(brought_in, "J"));
+    for (name, colour, of) in POTENTIALS {
+        // A force that did nothing has no curve.
+        if moments.iter().any(|moment| of(moment).is_some_and(|energy| energy != 0.0)) {
+            let energy = |moment: &Moment| Some((moment.time / time.factor, of(moment)? / e0));
+            curves.push(Curve { name, colour, points: moments.iter().filter_map(energy).collect() });
+        }
+    }
+    let what =
+        if e0 > ledger.energy_brought_in() { "is the most that forces gave" } else { "brought in until the end" };
+    let shows = format!("{shows}{potential}; E0 = {} {what}", quantity(e0, "J"));
     picture(SIZE, title, &shows, |area| {
         draw_curves(area, &curves, &format!("time ({}s)", time.symbol))?;
         draw_key(area, curves)
@@ -60,12 +80,12 @@ pub fn energy_history(title: &str, history: &History, brought_in: f64) -> io::Re
 fn draw_curves(area: &super::Area<'_>, curves: &[Curve], time: &str) -> Drawn {
     let points = || curves.iter().flat_map(|curve| &curve.points);
     let (start, end) = points().fold((f64::MAX, f64::MIN), |range, point| (range.0.min(point.0), range.1.max(point.0)));
-    let top = 1.05 * points().map(|point| point.1).fold(0.0, f64::max);
+    let [bottom, top] = [f64::min, f64::max].map(|of| 1.05 * points().map(|point| point.1).fold(0.0, of));
     let mut chart = ChartBuilder::on(&part(area, [10, HEADING, KEY - 20, SIZE[1] - HEADING - 10]))
         .set_label_area_size(LabelAreaPosition::Left, fine(58))
         .set_label_area_size(LabelAreaPosition::Bottom, fine(40))
         .margin_top(fine(10))
-        .build_cartesian_2d(start..end, 0.0..top)?;
+        .build_cartesian_2d(start..end, bottom..top)?;
     chart
         .configure_mesh()
         .disable_x_mesh()

@@ -30,6 +30,8 @@ const FAINT: RGBColor = RGBColor(0xdd, 0xdd, 0xdd);
 const BLUE: RGBColor = RGBColor(0x00, 0x72, 0xb2);
 const GREEN: RGBColor = RGBColor(0x00, 0x9e, 0x73);
 const ORANGE: RGBColor = RGBColor(0xd5, 0x5e, 0x00);
+const PURPLE: RGBColor = RGBColor(0xcc, 0x79, 0xa7);
+const SKY: RGBColor = RGBColor(0x56, 0xb4, 0xe9);
 
 /// Characters of a title that fit the narrowest picture.
 const TITLE_LENGTH: usize = 80;
