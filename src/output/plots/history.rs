@@ -16,10 +16,10 @@ const SIZE: [i32; 2] = [900, 520];
 const KEY: i32 = 665;
 
 /// Name, colour and value of a curve that may be absent.
-type Curve = (&'static str, RGBColor, fn(&Moment) -> Option<f64>);
+type Potential = (&'static str, RGBColor, fn(&Moment) -> Option<f64>);
 
 /// Potential energies, less what they were at the start.
-const POTENTIALS: [Curve; 2] = [
+const POTENTIALS: [Potential; 2] = [
     ("near-field potential", PURPLE, |moment| moment.near_field),
     ("potential of gravity", SKY, |moment| moment.gravity),
 ];
