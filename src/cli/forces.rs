@@ -84,7 +84,7 @@ fn near_field(out: &mut String, scene: &Scene, folder: &Path, count: f64) -> fmt
 fn term((alpha, beta): (f64, f64)) -> String {
     match alpha {
         0.0 => "none".to_owned(),
-        _ => format!("{alpha:e} r^-{beta} N"),
+        _ => format!("{alpha} r^-{beta} N"),
     }
 }
 
