@@ -66,7 +66,8 @@ impl Lists {
                 cells.visit_around(grain as u32, |other, shift| {
                     let theirs = &flights[other as usize];
                     let reach = flight.radius + theirs.radius + skin;
-                    if (theirs.position + shift - flight.position).norm_squared() < reach * reach {
+                    let apart = theirs.position + shift - flight.position;
+                    if other != grain as u32 && apart.norm_squared() < reach * reach {
                         lists.others.push((other, shift));
                     }
                 });

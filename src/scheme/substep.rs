@@ -8,7 +8,7 @@
 
 use std::ops::ControlFlow;
 
-use impinge_events::calendar::{Calendar, Tournament};
+use impinge_events::calendar::{Calendar, Buckets};
 use impinge_events::{Domain, Flight, Surface};
 use nalgebra::Vector3;
 use rustc_hash::FxHashMap;
@@ -71,7 +71,7 @@ const ATTEMPTS: u32 = 40;
 
 /// Grains under forces, advanced in sub-steps from event to event.
 #[derive(Clone, Debug)]
-pub struct Substepped<S: Surface, C: Calendar = Tournament> {
+pub struct Substepped<S: Surface, C: Calendar = Buckets> {
     engine: EventDriven<S, C>,
     forces: Forces,
     laws: Laws,

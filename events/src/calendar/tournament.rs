@@ -107,9 +107,14 @@ impl Calendar for Tournament {
     }
 
     #[inline]
-    fn next(&self) -> Option<(u32, Event)> {
+    fn next(&mut self) -> Option<(u32, Event)> {
         let first = self.matches.first()?[1];
         (first.owner != NOBODY).then(|| (first.owner, self.events[first.owner as usize]))
+    }
+
+    fn clear(&mut self) {
+        self.matches.fill([ABSENT; 2]);
+        self.events.fill(NO_EVENT);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::calendar::{Calendar, Event, Kind, Tournament};
+use crate::calendar::{Calendar, Event, Kind, Buckets};
 use crate::lists::Lists;
 use crate::neighbors::Cells;
 use crate::{Bend, Domain, Flight, NoSurface, Outlook, Surface};
@@ -52,6 +52,18 @@ enum Neighbors {
     Lists(Lists),
 }
 
+impl Neighbors {
+    /// Calls `visit` with every grain that can soon touch `grain`, perhaps with itself, and with the shift (m) of its image.
+    #[inline]
+    fn visit(&self, grain: u32, mut visit: impl FnMut(u32, Vector3<f64>)) {
+        match self {
+            Self::Nobody => {}
+            Self::Cells(cells) => cells.visit_around(grain, visit),
+            Self::Lists(lists) => lists.of(grain).iter().for_each(|&(other, shift)| visit(other, shift)),
+        }
+    }
+}
+
 /// Grains in free flight, and the order in which they meet each other and the surface.
 ///
 /// [`next_before`](Self::next_before) gives the next encounter with its grains advanced to it; the caller decides what it does to
@@ -75,7 +87,7 @@ enum Neighbors {
 /// assert_eq!(balls.flight(1).position_at(4.0).x, 5.0);
 /// ```
 #[derive(Clone, Debug)]
-pub struct Encounters<S: Surface = NoSurface, C: Calendar = Tournament> {
+pub struct Encounters<S: Surface = NoSurface, C: Calendar = Buckets> {
     flights: Vec<Flight>,
     plans: Vec<Plan>,
     neighbors: Neighbors,
@@ -96,6 +108,8 @@ pub struct Encounters<S: Surface = NoSurface, C: Calendar = Tournament> {
     crossings: usize,
     /// Neighbours looked at since then.
     looks: usize,
+    /// Neighbours that a search has to consider; empty between searches.
+    in_reach: Vec<(u32, Vector3<f64>)>,
 }
 
 impl<S: Surface, C: Calendar> Encounters<S, C> {
@@ -137,6 +151,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             sag: 0.0,
             crossings: 0,
             looks: 0,
+            in_reach: Vec::new(),
         }
     }
 
@@ -301,16 +316,6 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         self.resume(next);
     }
 
-    /// Calls `visit` with every grain that can soon touch `grain`, and the shift (m) of its image.
-    #[inline]
-    fn visit(&self, grain: u32, mut visit: impl FnMut(u32, Vector3<f64>)) {
-        match &self.neighbors {
-            Neighbors::Nobody => {}
-            Neighbors::Cells(cells) => cells.visit_around(grain, visit),
-            Neighbors::Lists(lists) => lists.of(grain).iter().for_each(|&(other, shift)| visit(other, shift)),
-        }
-    }
-
     /// Advances all grains to a common moment, which is time 0 from then on.
     fn halt(&mut self, duration: f64) {
         self.surface.start_epoch(duration);
@@ -387,6 +392,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     }
 
     fn predict_all(&mut self) {
+        self.calendar.clear();
         for grain in 0..self.flights.len() {
             self.plans[grain].pair = never(Kind::Review);
         }
@@ -406,7 +412,9 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
                 Neighbors::Nobody => self.domain.wrap(&mut flight.position),
                 Neighbors::Cells(cells) => {
                     self.domain.wrap(&mut flight.position);
-                    cells.wrapped(grain, flight.position - before);
+                    if flight.position != before {
+                        cells.wrapped(grain, flight.position - before);
+                    }
                 }
                 // The shifts in the lists are those of the positions with which they were made.
                 Neighbors::Lists(_) => {}
@@ -467,10 +475,14 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     /// Finds the first grain that this one meets, among all that are near.
     #[inline]
     fn find_partner(&mut self, grain: u32) {
+        let (mut in_reach, mut looks) = (std::mem::take(&mut self.in_reach), 0);
         let mut search = self.search(grain);
-        self.visit(grain, |other, shift| search.consider(other, shift));
-        let (best, looks) = (search.best, search.looks);
-        self.looks += looks;
+        self.neighbors.visit(grain, |other, shift| {
+            looks += 1;
+            search.look(other, shift, &mut in_reach);
+        });
+        let best = search.first_among(&mut in_reach);
+        (self.in_reach, self.looks) = (in_reach, self.looks + looks);
         self.plan_pair(grain, best);
     }
 
@@ -487,7 +499,6 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             flights: &self.flights,
             plans: &self.plans,
             best: plan.pair,
-            looks: 0,
         }
     }
 
@@ -525,11 +536,13 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         let mut best = self.plans[grain as usize].pair;
         if let Neighbors::Cells(cells) = &mut self.neighbors {
             let step = cells.cross(grain, &self.flights[grain as usize], axis);
+            let mut in_reach = std::mem::take(&mut self.in_reach);
             let mut search = self.search(grain);
             if let Neighbors::Cells(cells) = &self.neighbors {
-                cells.visit_ahead(grain, axis, step, |other, shift| search.consider(other, shift));
+                cells.visit_ahead(grain, axis, step, |other, shift| search.look(other, shift, &mut in_reach));
             }
-            best = search.best;
+            best = search.first_among(&mut in_reach);
+            self.in_reach = in_reach;
         }
         self.plans[grain as usize].crossing = self.crossing(grain);
         self.look_at_surface(grain);

@@ -67,21 +67,34 @@ pub(super) struct Search<'a> {
     pub(super) plans: &'a [Plan],
     /// The best so far.
     pub(super) best: Event,
-    /// How many have been looked at.
-    pub(super) looks: usize,
 }
 
 impl Search<'_> {
+    /// Puts `other` to `in_reach` if this grain may meet it. Most others are out of reach: to find out about all of them before going on with any
+    /// keeps this short.
+    #[inline]
+    pub(super) fn look(&self, other: u32, shift: Vector3<f64>, in_reach: &mut Vec<(u32, Vector3<f64>)>) {
+        let may = spheres_may_touch(&self.flight, &self.flights[other as usize], shift, self.until);
+        if may && other != self.grain {
+            in_reach.push((other, shift));
+        }
+    }
+
+    /// The first meeting with one `in_reach` that comes before all that either of the two has planned, or else what this grain has planned.
+    #[inline]
+    pub(super) fn first_among(&mut self, in_reach: &mut Vec<(u32, Vector3<f64>)>) -> Event {
+        for (other, shift) in in_reach.drain(..) {
+            self.consider(other, shift);
+        }
+        self.best
+    }
+
     /// Takes the meeting with `other` for the best if it comes before all that either of the two has planned.
     ///
     /// What `other` has planned earlier will deflect it, and then it looks for itself; so does whoever it leaves.
-    #[inline]
-    pub(super) fn consider(&mut self, other: u32, shift: Vector3<f64>) {
-        self.looks += 1;
+    #[inline(never)]
+    fn consider(&mut self, other: u32, shift: Vector3<f64>) {
         let theirs = &self.flights[other as usize];
-        if !spheres_may_touch(&self.flight, theirs, shift, self.until) {
-            return;
-        }
         let met = if let Some(sag) = self.sag {
             let slack = YIELDING * self.flight.radius.min(theirs.radius) + sag;
             sphere_sphere_yielding(&self.flight, theirs, shift, slack, self.horizon)

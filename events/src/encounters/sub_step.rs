@@ -69,7 +69,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         let mut touches = Vec::new();
         for a in self.inside() {
             let ours = self.flights[a as usize];
-            self.visit(a, |b, shift| {
+            self.neighbors.visit(a, |b, shift| {
                 let theirs = self.flights[b as usize];
                 let apart = theirs.position + shift - ours.position;
                 let within = ours.radius + theirs.radius + reach;

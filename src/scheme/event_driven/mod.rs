@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use impinge_events::calendar::{Calendar, Tournament};
+use impinge_events::calendar::{Calendar, Buckets};
 use impinge_events::{Domain, Encounter, Encounters, Flight, Surface};
 use nalgebra::Vector3;
 
@@ -62,7 +62,7 @@ pub struct Laws {
 
 /// Grains, what they meet, and the laws of their meetings; advanced from event to event.
 #[derive(Clone, Debug)]
-pub struct EventDriven<S: Surface, C: Calendar = Tournament> {
+pub struct EventDriven<S: Surface, C: Calendar = Buckets> {
     encounters: Encounters<S, C>,
     /// What grains carry besides their flights, by the numbers of `encounters`.
     grains: Vec<Grain>,
