@@ -8,7 +8,7 @@
 
 use std::ops::ControlFlow;
 
-use impinge_events::calendar::{Calendar, Buckets};
+use impinge_events::calendar::{Buckets, Calendar};
 use impinge_events::{Domain, Flight, Surface};
 use nalgebra::Vector3;
 use rustc_hash::FxHashMap;

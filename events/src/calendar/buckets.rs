@@ -295,3 +295,79 @@ impl Calendar for Buckets {
         (self.now, self.rate) = (0, 0.0);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt as _, SeedableRng as _};
+
+    use super::*;
+    use crate::calendar::PlainCalendar;
+
+    /// Random schedules and cancellations with many equal times: both calendars give the same events in the same order.
+    #[test]
+    fn buckets_equal_the_plain_calendar() {
+        let mut random = rand_pcg::Pcg64::seed_from_u64(7);
+        let (mut fast, mut plain) = (Buckets::default(), PlainCalendar::default());
+        for step in 0..200_000 {
+            let owner = random.random_range(0..1 + step / 500);
+            if random.random_range(0..4) == 0 {
+                fast.cancel(owner);
+                plain.cancel(owner);
+            } else {
+                let kind =
+                    [Kind::Crossing, Kind::Review, Kind::Grains, Kind::Surface, Kind::Exit][random.random_range(0..5)];
+                let time = f64::from(random.random_range(-20..20)) / 8.0;
+                let event = Event { time, kind, partner: random.random_range(0..9) };
+                fast.schedule(owner, event);
+                plain.schedule(owner, event);
+            }
+            let ends = (fast.next(), plain.next());
+            let same = match ends {
+                // A pair may stand in the calendar under both of its grains: then either may come first.
+                (Some((a, x)), Some((b, y))) => x.order(a, &y, b) == Ordering::Equal,
+                (a, b) => a.is_none() && b.is_none(),
+            };
+            assert!(same, "step {step}: {ends:?}");
+            if let Some((owner, _)) = ends.0.filter(|_| step % 3 == 0) {
+                fast.cancel(owner);
+                plain.cancel(owner);
+            }
+        }
+    }
+
+    /// The hold model with waits over many orders of magnitude, a crowd at one moment, and new starts: whatever the width of the buckets is by then.
+    #[test]
+    fn buckets_equal_the_plain_calendar_at_any_pace() {
+        let mut random = rand_pcg::Pcg64::seed_from_u64(8);
+        let (mut fast, mut plain) = (Buckets::default(), PlainCalendar::default());
+        let owners = 300;
+        for start in 0..40 {
+            fast.clear();
+            plain.clear();
+            let pace = 10_f64.powi(start % 20 - 10);
+            let schedule = |fast: &mut Buckets, plain: &mut PlainCalendar, owner, time| {
+                let event = Event { time, kind: Kind::Grains, partner: owner };
+                fast.schedule(owner, event);
+                plain.schedule(owner, event);
+            };
+            let mut wait = |scatter: i32| pace * 10_f64.powf(random.random_range(-1.0..1.0) * f64::from(scatter));
+            (0..owners).for_each(|owner| schedule(&mut fast, &mut plain, owner, wait(start % 7)));
+            for step in 0..4000 {
+                let (ours, theirs) = (fast.next(), plain.next());
+                assert_eq!(ours, theirs, "start {start}, step {step}");
+                let Some((owner, event)) = ours else { break };
+                // Now and then everybody waits for the same moment.
+                let pause = if step / 500 % 4 == 3 { pace } else { wait(start % 7) };
+                let time = if step / 500 % 4 == 3 { (event.time / pace).ceil() * pace } else { event.time };
+                schedule(&mut fast, &mut plain, owner, time + pause);
+            }
+        }
+    }
+
+    #[test]
+    fn an_event_that_never_comes_is_none() {
+        let mut calendar = Buckets::default();
+        calendar.schedule(3, Event { time: f64::INFINITY, kind: Kind::Grains, partner: 1 });
+        assert_eq!(calendar.next(), None);
+    }
+}

@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use crate::calendar::{Calendar, Event, Kind, Buckets};
+use crate::calendar::{Buckets, Calendar, Event, Kind};
 use crate::lists::Lists;
-use crate::neighbors::Cells;
+use crate::neighbors::{Cells, Near};
 use crate::{Bend, Domain, Flight, NoSurface, Outlook, Surface};
 
 mod plan;
@@ -47,19 +47,19 @@ enum Neighbors {
     /// Nobody: grains pass through each other.
     Nobody,
     /// For long flights.
-    Cells(Cells),
+    Cells(Box<Cells>),
     /// For short sub-steps.
     Lists(Lists),
 }
 
 impl Neighbors {
-    /// Calls `visit` with every grain that can soon touch `grain`, perhaps with itself, and with the shift (m) of its image.
+    /// Adds every grain that can soon touch `grain`, and perhaps itself, to `near`.
     #[inline]
-    fn visit(&self, grain: u32, mut visit: impl FnMut(u32, Vector3<f64>)) {
+    fn add(&self, grain: u32, near: &mut Near) {
         match self {
             Self::Nobody => {}
-            Self::Cells(cells) => cells.visit_around(grain, visit),
-            Self::Lists(lists) => lists.of(grain).iter().for_each(|&(other, shift)| visit(other, shift)),
+            Self::Cells(cells) => cells.add_around(grain, near),
+            Self::Lists(lists) => near.beyond.extend_from_slice(lists.of(grain)),
         }
     }
 }
@@ -108,8 +108,8 @@ pub struct Encounters<S: Surface = NoSurface, C: Calendar = Buckets> {
     crossings: usize,
     /// Neighbours looked at since then.
     looks: usize,
-    /// Neighbours that a search has to consider; empty between searches.
-    in_reach: Vec<(u32, Vector3<f64>)>,
+    /// The neighbours that were visited last, kept for its memory.
+    near: Near,
 }
 
 impl<S: Surface, C: Calendar> Encounters<S, C> {
@@ -151,7 +151,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             sag: 0.0,
             crossings: 0,
             looks: 0,
-            in_reach: Vec::new(),
+            near: Near::default(),
         }
     }
 
@@ -299,9 +299,9 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         };
         match &self.neighbors {
             Neighbors::Cells(cells) if cells.fits(radius) => {
-                let mut free = true;
-                cells.visit_near(position, time, |other, _| free &= keeps_clear(other));
-                free
+                let mut near = Near::default();
+                cells.add_near(position, time, &mut near);
+                near.iter().all(|(other, _)| keeps_clear(other))
             }
             _ => self.inside().all(keeps_clear),
         }
@@ -363,7 +363,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         for grain in self.inside() {
             cells.insert(grain, self.flight(grain), now);
         }
-        self.neighbors = Neighbors::Cells(cells);
+        self.neighbors = Neighbors::Cells(Box::new(cells));
         (self.crossings, self.looks) = (0, 0);
     }
 
@@ -475,14 +475,12 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     /// Finds the first grain that this one meets, among all that are near.
     #[inline]
     fn find_partner(&mut self, grain: u32) {
-        let (mut in_reach, mut looks) = (std::mem::take(&mut self.in_reach), 0);
-        let mut search = self.search(grain);
-        self.neighbors.visit(grain, |other, shift| {
-            looks += 1;
-            search.look(other, shift, &mut in_reach);
-        });
-        let best = search.first_among(&mut in_reach);
-        (self.in_reach, self.looks) = (in_reach, self.looks + looks);
+        let mut near = std::mem::take(&mut self.near);
+        near.clear();
+        self.neighbors.add(grain, &mut near);
+        self.looks += near.len();
+        let best = self.search(grain).first_among(&mut near);
+        self.near = near;
         self.plan_pair(grain, best);
     }
 
@@ -536,13 +534,13 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         let mut best = self.plans[grain as usize].pair;
         if let Neighbors::Cells(cells) = &mut self.neighbors {
             let step = cells.cross(grain, &self.flights[grain as usize], axis);
-            let mut in_reach = std::mem::take(&mut self.in_reach);
-            let mut search = self.search(grain);
-            if let Neighbors::Cells(cells) = &self.neighbors {
-                cells.visit_ahead(grain, axis, step, |other, shift| search.look(other, shift, &mut in_reach));
+            let mut near = std::mem::take(&mut self.near);
+            near.clear();
+            cells.add_ahead(grain, axis, step, &mut near);
+            if near.len() > 0 {
+                best = self.search(grain).first_among(&mut near);
             }
-            best = search.first_among(&mut in_reach);
-            self.in_reach = in_reach;
+            self.near = near;
         }
         self.plans[grain as usize].crossing = self.crossing(grain);
         self.look_at_surface(grain);

@@ -4,7 +4,8 @@ use nalgebra::Vector3;
 
 use crate::Flight;
 use crate::calendar::{Event, Kind};
-use crate::contact_time::{sphere_sphere, sphere_sphere_yielding, spheres_may_touch};
+use crate::contact_time::{sphere_sphere, sphere_sphere_yielding, spheres_may_touch, spheres_may_touch_two};
+use crate::neighbors::Near;
 
 /// No partner.
 pub(super) const NOBODY: u32 = u32::MAX;
@@ -70,21 +71,26 @@ pub(super) struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Puts `other` to `in_reach` if this grain may meet it. Most others are out of reach: to find out about all of them before going on with any
-    /// keeps this short.
+    /// The first meeting with one of `near` that comes before all that either of the two has planned, or else what this grain has planned.
+    ///
+    /// Most of `near` are out of reach. To find out about two of them at once before going on with either is the fastest way.
     #[inline]
-    pub(super) fn look(&self, other: u32, shift: Vector3<f64>, in_reach: &mut Vec<(u32, Vector3<f64>)>) {
-        let may = spheres_may_touch(&self.flight, &self.flights[other as usize], shift, self.until);
-        if may && other != self.grain {
-            in_reach.push((other, shift));
+    pub(super) fn first_among(mut self, near: &mut Near) -> Event {
+        if !near.here.len().is_multiple_of(2) {
+            near.here.push(self.grain);
         }
-    }
-
-    /// The first meeting with one `in_reach` that comes before all that either of the two has planned, or else what this grain has planned.
-    #[inline]
-    pub(super) fn first_among(&mut self, in_reach: &mut Vec<(u32, Vector3<f64>)>) -> Event {
-        for (other, shift) in in_reach.drain(..) {
-            self.consider(other, shift);
+        for two in near.here.as_chunks::<2>().0 {
+            let flights = two.map(|other| &self.flights[other as usize]);
+            let mut in_reach = spheres_may_touch_two(&self.flight, flights, self.until);
+            while in_reach != 0 {
+                self.consider(two[in_reach.trailing_zeros() as usize], Vector3::zeros());
+                in_reach &= in_reach - 1;
+            }
+        }
+        for &(other, shift) in &near.beyond {
+            if spheres_may_touch(&self.flight, &self.flights[other as usize], shift, self.until) {
+                self.consider(other, shift);
+            }
         }
         self.best
     }
@@ -94,6 +100,9 @@ impl Search<'_> {
     /// What `other` has planned earlier will deflect it, and then it looks for itself; so does whoever it leaves.
     #[inline(never)]
     fn consider(&mut self, other: u32, shift: Vector3<f64>) {
+        if other == self.grain {
+            return;
+        }
         let theirs = &self.flights[other as usize];
         let met = if let Some(sag) = self.sag {
             let slack = YIELDING * self.flight.radius.min(theirs.radius) + sag;

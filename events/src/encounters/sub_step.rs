@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::{Encounters, Neighbors, is_vacant};
 use crate::calendar::Calendar;
 use crate::lists::{Lists, skin};
-use crate::neighbors::Cells;
+use crate::neighbors::{Cells, Near};
 use crate::{Bend, Flight, Surface};
 
 /// Two grains that touch or nearly do.
@@ -66,17 +66,19 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
 
     /// All pairs of grains, standing at time 0, that are nearer to each other than `reach` (m), in the order of their numbers.
     fn touches(&self, reach: f64) -> Vec<Touch> {
-        let mut touches = Vec::new();
+        let (mut touches, mut near) = (Vec::new(), Near::default());
         for a in self.inside() {
             let ours = self.flights[a as usize];
-            self.neighbors.visit(a, |b, shift| {
+            near.clear();
+            self.neighbors.add(a, &mut near);
+            for (b, shift) in near.iter() {
                 let theirs = self.flights[b as usize];
                 let apart = theirs.position + shift - ours.position;
                 let within = ours.radius + theirs.radius + reach;
                 if a < b && apart.norm_squared() < within * within {
                     touches.push(Touch { a, b, apart });
                 }
-            });
+            }
         }
         touches.sort_unstable_by_key(|touch| (touch.a, touch.b));
         touches

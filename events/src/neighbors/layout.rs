@@ -169,4 +169,3 @@ fn quantile(values: &mut [f64], part: f64) -> f64 {
     let rank = ((values.len() - 1) as f64 * part) as usize;
     *values.select_nth_unstable_by(rank, f64::total_cmp).1
 }
-

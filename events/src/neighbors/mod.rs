@@ -40,6 +40,31 @@ struct Link {
     turns: u64,
 }
 
+/// Grains that are near another one.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Near {
+    /// Those that are where their stored positions say.
+    pub(crate) here: Vec<u32>,
+    /// Those whose periodic images are near, and the shift (m) that brings them there. Others may be among them, with a shift of zero.
+    pub(crate) beyond: Vec<(u32, Vector3<f64>)>,
+}
+
+impl Near {
+    pub(crate) fn clear(&mut self) {
+        self.here.clear();
+        self.beyond.clear();
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.here.len() + self.beyond.len()
+    }
+
+    /// All of them, with their shifts.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (u32, Vector3<f64>)> + '_ {
+        self.here.iter().map(|&other| (other, Vector3::zeros())).chain(self.beyond.iter().copied())
+    }
+}
+
 /// Where a grain stands in the grid.
 #[derive(Clone, Copy, Debug)]
 struct Place {
@@ -86,10 +111,6 @@ const fn steps(number: usize) -> [i32; 3] {
     [number % 3 - 1, number / 3 % 3 - 1, number / 9 - 1]
 }
 
-fn step(number: usize) -> Vector3<i32> {
-    steps(number).into()
-}
-
 /// The grid.
 #[derive(Clone, Debug)]
 pub(crate) struct Cells {
@@ -101,7 +122,7 @@ pub(crate) struct Cells {
     links: Vec<Link>,
     places: Vec<Place>,
     /// What the cells around a cell add to its number, for each kind of edge.
-    offsets: [[u32; 27]; 27],
+    offsets: Box<[[u32; 27]; 27]>,
 }
 
 impl Cells {
@@ -124,10 +145,10 @@ impl Cells {
     }
 
     fn empty(domain: Domain, layout: Layout, grains: usize) -> Self {
-        let offsets = std::array::from_fn(|edges| Self::offsets(&layout, edges));
+        let offsets = Box::new(std::array::from_fn(|edges| Self::offsets(&layout, edges)));
         // In a planar scene nobody is beside the plane.
         let beside = if domain.planar { AHEAD[1][0] | AHEAD[1][1] } else { 0 };
-        let around = (1 << 27) - 1 & !beside;
+        let around = ((1 << 27) - 1) & !beside;
         Self { layout, domain, around, slots: Slots::new(grains), links: Vec::new(), places: Vec::new(), offsets }
     }
 
@@ -290,29 +311,27 @@ impl Cells {
         step
     }
 
-    /// Calls `visit` with every grain in the cells that have become adjacent to grain `id` by its last `step` along `axis`, and with the shift
-    /// (m) of its periodic image that is there.
+    /// Adds to `near` every grain in the cells that have become adjacent to grain `id` by its last `step` along `axis`.
     #[inline]
-    pub(crate) fn visit_ahead(&self, id: u32, axis: u8, step: i32, visit: impl FnMut(u32, Vector3<f64>)) {
+    pub(crate) fn add_ahead(&self, id: u32, axis: u8, step: i32, near: &mut Near) {
         let ahead = AHEAD[usize::from(axis)][usize::from(step > 0)];
-        self.visit_cells(self.places[id as usize], self.links[id as usize], ahead & self.around, visit);
+        self.add(self.places[id as usize], self.links[id as usize], ahead & self.around, near);
     }
 
-    /// The same with every grain in the cells around grain `id`, itself included.
+    /// Adds to `near` every grain in the cells around grain `id`, itself included.
     #[inline]
-    pub(crate) fn visit_around(&self, id: u32, visit: impl FnMut(u32, Vector3<f64>)) {
-        self.visit_cells(self.places[id as usize], self.links[id as usize], self.around, visit);
+    pub(crate) fn add_around(&self, id: u32, near: &mut Near) {
+        self.add(self.places[id as usize], self.links[id as usize], self.around, near);
     }
 
-    /// The same with every grain in the cells around `position`, where there need not be a grain.
-    pub(crate) fn visit_near(&self, position: Vector3<f64>, time: f64, visit: impl FnMut(u32, Vector3<f64>)) {
+    /// Adds to `near` every grain in the cells around `position`, where there need not be a grain.
+    pub(crate) fn add_near(&self, position: Vector3<f64>, time: f64, near: &mut Near) {
         let (place, number, turns) = self.place(self.cell_of(position, time));
-        self.visit_cells(place, Link { number, next: NOBODY, turns }, self.around, visit);
+        self.add(place, Link { number, next: NOBODY, turns }, self.around, near);
     }
 
-    /// Calls `visit` with every grain in those of the 27 cells around a place whose bits are set.
-    #[inline]
-    fn visit_cells(&self, place: Place, link: Link, wanted: u32, mut visit: impl FnMut(u32, Vector3<f64>)) {
+    /// Adds to `near` every grain in those of the 27 cells around a place whose bits are set.
+    fn add(&self, place: Place, link: Link, wanted: u32, near: &mut Near) {
         let offsets = &self.offsets[place.edges as usize];
         let mut occupied = 0;
         for row in 0..9 {
@@ -333,9 +352,9 @@ impl Cells {
                 let theirs = self.links[other as usize];
                 if theirs.number == number {
                     if place.edges == INSIDE && theirs.turns == link.turns {
-                        visit(other, Vector3::zeros());
+                        near.here.push(other);
                     } else {
-                        visit(other, self.shift(other, place.cell + step(around)));
+                        near.beyond.push((other, self.shift(other, place.cell, around)));
                     }
                 }
                 other = theirs.next;
@@ -343,10 +362,11 @@ impl Cells {
         }
     }
 
-    /// The shift (m) that brings `grain` to where its image in `cell` is.
-    fn shift(&self, grain: u32, cell: Vector3<i32>) -> Vector3<f64> {
+    /// The shift (m) that brings `grain` to where its image is in the cell with this number around `centre`.
+    #[inline(never)]
+    fn shift(&self, grain: u32, centre: Vector3<i32>, around: usize) -> Vector3<f64> {
         let Layout { period, extent, .. } = &self.layout;
-        let apart = cell - self.places[grain as usize].cell;
+        let apart = centre + Vector3::from(steps(around)) - self.places[grain as usize].cell;
         Vector3::from_fn(|axis, _| f64::from(apart[axis] / period[axis].max(1)) * extent[axis])
     }
 }

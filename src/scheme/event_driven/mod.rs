@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use impinge_events::calendar::{Calendar, Buckets};
+use impinge_events::calendar::{Buckets, Calendar};
 use impinge_events::{Domain, Encounter, Encounters, Flight, Surface};
 use nalgebra::Vector3;
 
