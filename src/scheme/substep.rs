@@ -17,7 +17,7 @@ use super::event_driven::{Held, Under};
 use super::resting::Resting;
 use super::{Broken, EventDriven, Kick, Laws, Observer, Passage, Progress, Rest};
 use crate::grains::{Grain, NewGrain, kinetic_energy};
-use crate::near_field::{ForceSum, MeasuredError, Singular};
+use crate::near_field::{ForceSum, MeasuredError, Method, Singular};
 use crate::sum::{Sum, VectorSum};
 
 /// What acts on grains between events.
@@ -399,7 +399,8 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
         // Where contact lies within the switch of a cut-off, the force at contact is not that of the law: then that of the kick is kept.
         let plain_at_contact = |sum: &&ForceSum| sum.is_plain_within(2.0 * engine.largest_radius());
         let near_field = forces.near_field.as_ref().filter(plain_at_contact).map(|sum| *sum.law());
-        let under = Under { reach, gravity, near_field, contact_time: forces.contact_time };
+        let all_pairs = forces.near_field.as_ref().is_some_and(|sum| sum.method() == Method::Direct);
+        let under = Under { reach, gravity, near_field, all_pairs, contact_time: forces.contact_time };
         engine.start_sub_step(&under, |surface, touches, grains, flights, accelerations| {
             end.clear();
             end.extend_from_slice(accelerations);

@@ -297,8 +297,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     fn collide(&mut self, time: f64, a: u32, b: u32, observer: &mut impl Observer) -> Result<(), Broken> {
         // The lower id is the first of the two: slots are used again, ids are not.
         let (a, b) = if self.grains[a as usize].id < self.grains[b as usize].id { (a, b) } else { (b, a) };
-        self.synchronise(a, b);
-        let (first, second) = (self.body(a), self.body(b));
+        let (mut first, mut second) = (self.body(a), self.body(b));
         let (flight_a, flight_b) = (self.true_flight(a), self.true_flight(b));
         // The chords touch, and the normal is theirs: whoever resolves a contact sees the approach that the prediction saw.
         let chords = self.encounters.flight(b).position - self.encounters.flight(a).position;
@@ -315,9 +314,13 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             self.deflect(&[(other, onwards)]);
             return Ok(());
         }
-        if self.force.acts && (first.velocity - second.velocity).dot(&normal) <= self.force.resting_speed_of_pairs {
+        let lag = self.lag_of_near_field(time, [a, b]);
+        let approach = (first.velocity - second.velocity + lag[0] - lag[1]).dot(&normal);
+        if self.force.acts && approach <= self.force.resting_speed_of_pairs {
             return self.hold_pair(time, [a, b], [first, second], normal, overlap_over_radius);
         }
+        first.velocity += lag[0];
+        second.velocity += lag[1];
         let external = self.external([a, b]);
         let mut contact = resolve_pair_under(&self.laws.grain, &first, &second, normal, &external);
         let mut withheld = 0.0;
@@ -330,7 +333,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         }
         // Where rounding has turned the slightest graze into none, both fly on.
         if contact.impulse.normal == 0.0 {
-            self.deflect(&[(a, first.velocity), (b, second.velocity)]);
+            self.deflect(&[(a, first.velocity - lag[0]), (b, second.velocity - lag[1])]);
             return Ok(());
         }
         let [mut after_a, mut after_b] = contact.after;
@@ -344,7 +347,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.check(time, &ids, overlap_over_radius, &[after_a.velocity, after_b.velocity])?;
         self.grains[a as usize].spin = after_a.spin;
         self.grains[b as usize].spin = after_b.spin;
-        self.deflect(&[(a, after_a.velocity), (b, after_b.velocity)]);
+        self.deflect(&[(a, after_a.velocity - lag[0]), (b, after_b.velocity - lag[1])]);
         self.collisions += 1;
         observer.grain_collision(&GrainCollision {
             time: self.epoch_start + time,
@@ -378,6 +381,8 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         {
             return self.hold_on_surface(time, grain, &before, &contact);
         }
+        let [lag] = self.lag_of_near_field(time, [grain]);
+        let before = Body { velocity: before.velocity + lag, ..before };
         let external = self.external([grain, grain]).on_first;
         let mut resolved =
             resolve_surface_under(&self.laws.surface, &before, contact.normal, contact.velocity, external);
@@ -393,7 +398,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             self.force.held.dissipated_surface += change - resolved.impulse.dissipated;
         }
         if resolved.impulse.normal == 0.0 {
-            self.deflect(&[(grain, before.velocity)]);
+            self.deflect(&[(grain, before.velocity - lag)]);
             return Ok(());
         }
         let overlap_over_radius = -contact.gap / before.radius;
@@ -405,7 +410,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         if matches!(self.laws.interference, Interference::FirstOrder | Interference::RemovedOnFirstCollision) {
             self.encounters.pass_through_surface(grain);
         }
-        self.deflect(&[(grain, resolved.after.velocity)]);
+        self.deflect(&[(grain, resolved.after.velocity - lag)]);
         self.collisions += 1;
         let arriving = before.velocity - contact.velocity;
         let energy_normal = 0.5 * before.mass * arriving.dot(&contact.normal).powi(2);

@@ -1,9 +1,9 @@
 //! What the engine does where forces act: sub-steps, synchronised kicks, contacts at rest within a sub-step.
 
 use impinge_events::calendar::Calendar;
-use impinge_events::{Flight, Surface, SurfaceContact, Touch, YIELDING};
+use impinge_events::{Bend, Flight, Surface, SurfaceContact, Touch, YIELDING};
 use nalgebra::Vector3;
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashMap;
 
 use super::EventDriven;
 use crate::grains::Grain;
@@ -33,6 +33,8 @@ pub(in crate::scheme) struct Under {
     pub(in crate::scheme) gravity: Vector3<f64>,
     /// The near field, as it acts between two grains that touch.
     pub(in crate::scheme) near_field: Option<NearField>,
+    /// Whether it is summed over all pairs, one by one.
+    pub(in crate::scheme) all_pairs: bool,
     /// How long a contact lasts for the impulse that forces give to it, s.
     pub(in crate::scheme) contact_time: f64,
 }
@@ -77,8 +79,6 @@ pub(super) struct UnderForce {
     anchors: Vec<Vector3<f64>>,
     /// Which grains touched others at the last kick.
     touching: Vec<bool>,
-    /// Pairs whose accelerations are those of their contact already.
-    synchronised: FxHashSet<[u32; 2]>,
     /// Grains that the surface carries since they came to rest on it in this sub-step.
     pub(super) supported: FxHashMap<u32, Support>,
     /// What contacts at rest did since it was last asked.
@@ -122,7 +122,6 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.force.resting_speed_of_pairs =
             if sticks { PAIR_REST * strongest * length } else { self.force.resting_speed };
         self.force.anchors.clear();
-        self.force.synchronised.clear();
         self.force.supported.clear();
         if under.near_field.is_some() {
             let slots = 0..self.grains.len() as u32;
@@ -184,23 +183,29 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         External::new(grains.map(force), self.force.under.contact_time)
     }
 
-    /// Gives two grains that touch the accelerations they have there: the near field between the two at contact, in place of that at the last
-    /// kick. The rest of the near field hardly changes within a sub-step.
-    #[inline]
-    pub(super) fn synchronise(&mut self, a: u32, b: u32) {
-        let Some(near_field) = self.force.under.near_field else { return };
-        let slots = self.force.anchors.len() as u32;
-        if a < slots && b < slots && self.force.synchronised.insert([a, b]) {
-            let [at_kick_a, at_kick_b] = [a, b].map(|grain| self.force.anchors[grain as usize]);
-            let now = self.true_flight(b).position - self.true_flight(a).position;
-            let strength = self.grains[a as usize].strength * self.grains[b as usize].strength;
-            let force = (near_field.force_on(self.domain.nearest(now))
-                - near_field.force_on(self.domain.nearest(at_kick_b - at_kick_a)))
-                * strength;
-            for (grain, force) in [(a, force), (b, -force)] {
-                self.encounters.pull(grain, force / self.grains[grain as usize].mass);
-            }
-        }
+    /// What grains that touch now have too little or too much of velocity (m/s), because the near field has changed since the last kick: with it they
+    /// collide, and without it their chords go on.
+    pub(super) fn lag_of_near_field<const N: usize>(&self, time: f64, grains: [u32; N]) -> [Vector3<f64>; N] {
+        let Some(near_field) = self.force.under.near_field else { return [Vector3::zeros(); N] };
+        let step = self.encounters.bend(grains[0]).step;
+        grains.map(|grain| {
+            let Some(&anchor) = self.force.anchors.get(grain as usize) else { return Vector3::zeros() };
+            let place = self.encounters.flight(grain).position_at(time);
+            let more = |other: u32| {
+                let Some(&other_anchor) = self.force.anchors.get(other as usize) else { return Vector3::zeros() };
+                let now = self.encounters.flight(other).position_at(time) - place;
+                let change = near_field.force_on(self.domain.nearest(now))
+                    - near_field.force_on(self.domain.nearest(other_anchor - anchor));
+                change * self.grains[other as usize].strength
+            };
+            let change: Vector3<f64> = if self.force.under.all_pairs {
+                self.encounters.inside().filter(|&other| other != grain).map(more).sum()
+            } else {
+                grains.into_iter().filter(|&other| other != grain).map(more).sum()
+            };
+            let Grain { mass, strength, .. } = self.grains[grain as usize];
+            Bend { acceleration: change * (strength / mass), step }.velocity(time)
+        })
     }
 
     /// Two grains at rest against each other stay so until the end of the sub-step: what their chords approach is taken away by an impulse.
