@@ -314,13 +314,14 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             self.deflect(&[(other, onwards)]);
             return Ok(());
         }
-        let lag = self.lag_of_near_field(time, [a, b]);
-        let approach = (first.velocity - second.velocity + lag[0] - lag[1]).dot(&normal);
+        let elastic = normal * (2.0 * (first.velocity - second.velocity).dot(&normal) / (first.mass + second.mass));
+        let late = self.synchronisation(time, [a, b], [-elastic * second.mass, elastic * first.mass]);
+        let approach = (first.velocity - second.velocity + late[0] - late[1]).dot(&normal);
         if self.force.acts && approach <= self.force.resting_speed_of_pairs {
             return self.hold_pair(time, [a, b], [first, second], normal, overlap_over_radius);
         }
-        first.velocity += lag[0];
-        second.velocity += lag[1];
+        first.velocity += late[0];
+        second.velocity += late[1];
         let external = self.external([a, b]);
         let mut contact = resolve_pair_under(&self.laws.grain, &first, &second, normal, &external);
         let mut withheld = 0.0;
@@ -333,7 +334,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         }
         // Where rounding has turned the slightest graze into none, both fly on.
         if contact.impulse.normal == 0.0 {
-            self.deflect(&[(a, first.velocity - lag[0]), (b, second.velocity - lag[1])]);
+            self.deflect(&[(a, first.velocity - late[0]), (b, second.velocity - late[1])]);
             return Ok(());
         }
         let [mut after_a, mut after_b] = contact.after;
@@ -347,7 +348,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.check(time, &ids, overlap_over_radius, &[after_a.velocity, after_b.velocity])?;
         self.grains[a as usize].spin = after_a.spin;
         self.grains[b as usize].spin = after_b.spin;
-        self.deflect(&[(a, after_a.velocity - lag[0]), (b, after_b.velocity - lag[1])]);
+        self.deflect(&[(a, after_a.velocity - late[0]), (b, after_b.velocity - late[1])]);
         self.collisions += 1;
         observer.grain_collision(&GrainCollision {
             time: self.epoch_start + time,
@@ -381,8 +382,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         {
             return self.hold_on_surface(time, grain, &before, &contact);
         }
-        let [lag] = self.lag_of_near_field(time, [grain]);
-        let before = Body { velocity: before.velocity + lag, ..before };
+        let elastic = contact.normal * (2.0 * (before.velocity - contact.velocity).dot(&contact.normal));
+        let [late] = self.synchronisation(time, [grain], [-elastic]);
+        let before = Body { velocity: before.velocity + late, ..before };
         let external = self.external([grain, grain]).on_first;
         let mut resolved =
             resolve_surface_under(&self.laws.surface, &before, contact.normal, contact.velocity, external);
@@ -398,7 +400,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             self.force.held.dissipated_surface += change - resolved.impulse.dissipated;
         }
         if resolved.impulse.normal == 0.0 {
-            self.deflect(&[(grain, before.velocity - lag)]);
+            self.deflect(&[(grain, before.velocity - late)]);
             return Ok(());
         }
         let overlap_over_radius = -contact.gap / before.radius;
@@ -410,7 +412,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         if matches!(self.laws.interference, Interference::FirstOrder | Interference::RemovedOnFirstCollision) {
             self.encounters.pass_through_surface(grain);
         }
-        self.deflect(&[(grain, resolved.after.velocity - lag)]);
+        self.deflect(&[(grain, resolved.after.velocity - late)]);
         self.collisions += 1;
         let arriving = before.velocity - contact.velocity;
         let energy_normal = 0.5 * before.mass * arriving.dot(&contact.normal).powi(2);
@@ -482,6 +484,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             }
         } else {
             self.grains[slot] = grain;
+            if let Some(anchor) = self.force.anchors.get_mut(slot) {
+                *anchor = None;
+            }
             if let Some(row) = self.rows.get_mut(slot) {
                 *row = NO_ROW;
             }
