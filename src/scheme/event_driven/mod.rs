@@ -467,7 +467,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let flight = self.true_flight(grain);
         self.pass(grain, 1.0);
         observer.passage(passage, self.epoch_start + time, &flight, &self.grains[grain as usize]);
-        self.force.supported.remove(&grain);
+        self.release(grain);
         self.encounters.remove(grain);
     }
 
