@@ -138,6 +138,11 @@ impl NearField {
         attraction.abs() + repulsion.abs()
     }
 
+    /// Magnitudes of attraction and repulsion at distance `r`, N.
+    pub(crate) fn magnitudes(&self, r: f64) -> [f64; 2] {
+        with_radial!(self, radial => radial.terms(r * r)).map(|term| term.abs() * r)
+    }
+
     /// Sum of the magnitudes of both terms at distance `r`, N.
     #[must_use]
     pub fn magnitude(&self, r: f64) -> f64 {
