@@ -29,11 +29,6 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         Bend { acceleration, step }
     }
 
-    /// Adds to the acceleration (m/s²) of a grain that has just met something, as if it had been so since the sub-step began: the chord stays.
-    pub fn pull(&mut self, grain: u32, more: Vector3<f64>) {
-        self.accelerations[grain as usize] += more;
-    }
-
     /// Changes the acceleration (m/s²) of a grain that has just met something and is yet to be deflected: place and velocity stay, the chord
     /// changes.
     pub fn accelerate(&mut self, grain: u32, acceleration: Vector3<f64>) {
