@@ -34,8 +34,9 @@ impl NewGrain {
     }
 }
 
-/// What a grain carries besides its flight: prediction does not read it, so it lives apart from [`Flight`].
+/// What a grain carries besides its flight: prediction does not read it, so it lives apart from [`Flight`], in a cache line of its own.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(align(64))]
 pub struct Grain {
     /// The number the user sees: grains are numbered from 0 in the order in which they entered.
     pub id: u64,

@@ -3,10 +3,8 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use super::{Calendar, Event, Kind};
+use super::{Calendar, Event, Kind, NOBODY, Plan, never};
 
-const NOBODY: u32 = u32::MAX;
-const NO_EVENT: Event = Event { time: f64::INFINITY, kind: Kind::Exit, partner: u32::MAX };
 /// Buckets for each event: as many as hold most of the waiting times when about one event is in each.
 const BUCKETS_PER_EVENT: usize = 2;
 /// The buckets are laid out anew when fewer events than this part of their number, or more than so many times their number, have come in a turn.
@@ -20,10 +18,7 @@ const MOST_EVENTS: usize = 4;
 /// scheduled into it from then on. About one event is in a bucket, so the heap is all but empty. Should thousands come at once, it is a heap still.
 #[derive(Clone, Debug)]
 pub struct Buckets {
-    /// The event of each owner.
-    events: Vec<Event>,
-    /// Owners before and after each in the list where it waits.
-    links: Vec<Link>,
+    owners: Vec<Owner>,
     /// First owner in each of the lists: those of a turn, and last the one for later turns.
     first: Vec<u32>,
     /// Events of the present bucket and all before it, and some that are no longer so.
@@ -44,10 +39,23 @@ pub struct Buckets {
     passed_before: usize,
 }
 
+/// All that belongs to an owner, in one cache line: what the calendar needs of it is then at hand for who asks for its plan.
 #[derive(Clone, Copy, Debug)]
-struct Link {
+#[repr(align(64))]
+struct Owner {
+    event: Event,
+    /// Who stands before and after it in the list where it waits.
     before: u32,
     after: u32,
+    plan: Plan,
+}
+
+const _: () = assert!(size_of::<Owner>() == 64);
+
+impl Default for Owner {
+    fn default() -> Self {
+        Self { event: never(Kind::Exit), before: NOBODY, after: NOBODY, plan: Plan::default() }
+    }
 }
 
 /// An event of `owner` in the heap.
@@ -83,8 +91,7 @@ impl Eq for Entry {}
 impl Default for Buckets {
     fn default() -> Self {
         Self {
-            events: Vec::new(),
-            links: Vec::new(),
+            owners: Vec::new(),
             first: vec![NOBODY; 2],
             present: BinaryHeap::new(),
             now: 0,
@@ -125,7 +132,7 @@ impl Buckets {
         if self.rate == 0.0 {
             return;
         }
-        let event = self.events[owner as usize];
+        let event = self.owners[owner as usize].event;
         let bucket = self.bucket(event.time);
         if bucket <= self.now {
             self.passed += 1;
@@ -133,9 +140,10 @@ impl Buckets {
         }
         let list = self.list(bucket);
         let after = std::mem::replace(&mut self.first[list], owner);
-        self.links[owner as usize] = Link { before: NOBODY, after };
+        let ours = &mut self.owners[owner as usize];
+        (ours.before, ours.after) = (NOBODY, after);
         if after != NOBODY {
-            self.links[after as usize].before = owner;
+            self.owners[after as usize].before = owner;
         }
         self.waiting += usize::from(list + 1 < self.first.len());
     }
@@ -143,7 +151,7 @@ impl Buckets {
     /// Takes the event of `owner` from where it is; the heap forgets it later.
     #[inline]
     fn leave(&mut self, owner: u32) {
-        let time = self.events[owner as usize].time;
+        let time = self.owners[owner as usize].event.time;
         if time == f64::INFINITY {
             return;
         }
@@ -151,15 +159,15 @@ impl Buckets {
         if bucket <= self.now {
             return;
         }
-        let Link { before, after } = self.links[owner as usize];
+        let Owner { before, after, .. } = self.owners[owner as usize];
         let list = self.list(bucket);
         if before == NOBODY {
             self.first[list] = after;
         } else {
-            self.links[before as usize].after = after;
+            self.owners[before as usize].after = after;
         }
         if after != NOBODY {
-            self.links[after as usize].before = before;
+            self.owners[after as usize].before = before;
         }
         self.waiting -= usize::from(list + 1 < self.first.len());
     }
@@ -181,8 +189,8 @@ impl Buckets {
             while owner != NOBODY {
                 self.waiting -= 1;
                 self.passed += 1;
-                self.present.push(Entry { event: self.events[owner as usize], owner });
-                owner = self.links[owner as usize].after;
+                self.present.push(Entry { event: self.owners[owner as usize].event, owner });
+                owner = self.owners[owner as usize].after;
             }
         }
         true
@@ -201,8 +209,8 @@ impl Buckets {
         let later = self.first.len() - 1;
         let mut owner = self.first[later];
         while owner != NOBODY {
-            next = next.min(self.bucket(self.events[owner as usize].time));
-            owner = self.links[owner as usize].after;
+            next = next.min(self.bucket(self.owners[owner as usize].event.time));
+            owner = self.owners[owner as usize].after;
         }
         self.turn = next & !(self.buckets() - 1);
         // The bucket before the next one: everybody is later.
@@ -210,7 +218,7 @@ impl Buckets {
         self.passed = 0;
         owner = std::mem::replace(&mut self.first[later], NOBODY);
         while owner != NOBODY {
-            let after = self.links[owner as usize].after;
+            let after = self.owners[owner as usize].after;
             self.enter(owner);
             owner = after;
         }
@@ -220,7 +228,7 @@ impl Buckets {
     #[cold]
     fn lay_out(&mut self) {
         let mut times: Vec<f64> =
-            self.events.iter().map(|event| event.time).filter(|&time| time < f64::INFINITY).collect();
+            self.owners.iter().map(|owner| owner.event.time).filter(|&time| time < f64::INFINITY).collect();
         if times.is_empty() {
             return;
         }
@@ -233,8 +241,8 @@ impl Buckets {
         self.first.resize((BUCKETS_PER_EVENT * count).next_power_of_two() + 1, NOBODY);
         self.present.clear();
         (self.now, self.turn, self.waiting, self.passed, self.passed_before) = (0, 0, 0, 0, 0);
-        for owner in 0..self.events.len() as u32 {
-            if self.events[owner as usize].time < f64::INFINITY {
+        for owner in 0..self.owners.len() as u32 {
+            if self.owners[owner as usize].event.time < f64::INFINITY {
                 self.enter(owner);
             }
         }
@@ -243,31 +251,28 @@ impl Buckets {
 
 impl Calendar for Buckets {
     fn reserve(&mut self, owners: usize) {
-        if owners > self.events.len() {
-            self.events.resize(owners, NO_EVENT);
-            self.links.resize(owners, Link { before: NOBODY, after: NOBODY });
-        }
+        self.owners.resize(owners.max(self.owners.len()), Owner::default());
     }
 
     #[inline]
     fn schedule(&mut self, owner: u32, event: Event) {
-        if owner as usize >= self.events.len() {
+        if owner as usize >= self.owners.len() {
             self.reserve(owner as usize + 1);
         }
-        if self.events[owner as usize] == event {
+        if self.owners[owner as usize].event == event {
             return;
         }
         self.leave(owner);
-        self.events[owner as usize] = event;
+        self.owners[owner as usize].event = event;
         if event.time < f64::INFINITY {
             self.enter(owner);
         }
     }
 
     fn cancel(&mut self, owner: u32) {
-        if (owner as usize) < self.events.len() {
+        if (owner as usize) < self.owners.len() {
             self.leave(owner);
-            self.events[owner as usize] = NO_EVENT;
+            self.owners[owner as usize].event = never(Kind::Exit);
         }
     }
 
@@ -278,7 +283,7 @@ impl Calendar for Buckets {
         }
         loop {
             while let Some(&Entry { event, owner }) = self.present.peek() {
-                if self.events[owner as usize] == event {
+                if self.owners[owner as usize].event == event {
                     return Some((owner, event));
                 }
                 self.present.pop();
@@ -290,9 +295,19 @@ impl Calendar for Buckets {
     }
 
     fn clear(&mut self) {
-        self.events.fill(NO_EVENT);
+        self.owners.iter_mut().for_each(|owner| owner.event = never(Kind::Exit));
         self.present.clear();
         (self.now, self.rate) = (0, 0.0);
+    }
+
+    #[inline]
+    fn plan(&self, owner: u32) -> &Plan {
+        &self.owners[owner as usize].plan
+    }
+
+    #[inline]
+    fn plan_mut(&mut self, owner: u32) -> &mut Plan {
+        &mut self.owners[owner as usize].plan
     }
 }
 

@@ -6,9 +6,12 @@
 
 mod buckets;
 mod plain;
+mod plan;
 
 pub use buckets::Buckets;
 pub use plain::PlainCalendar;
+pub use plan::Plan;
+pub(crate) use plan::{NOBODY, never};
 
 use std::cmp::Ordering;
 
@@ -77,6 +80,12 @@ pub trait Calendar: Default {
     /// The first event and its owner; it stays in the calendar.
     fn next(&mut self) -> Option<(u32, Event)>;
 
-    /// Takes all events out: those to come may lie earlier than those that have been.
+    /// What else lies before `owner`.
+    fn plan(&self, owner: u32) -> &Plan;
+
+    /// The same, to be changed.
+    fn plan_mut(&mut self, owner: u32) -> &mut Plan;
+
+    /// Takes all events out, and leaves the plans: those to come may lie earlier than those that have been.
     fn clear(&mut self);
 }

@@ -5,7 +5,7 @@ use std::cmp::Reverse;
 use ordered_float::OrderedFloat;
 use priority_queue::PriorityQueue;
 
-use super::{Calendar, Event, Kind};
+use super::{Calendar, Event, Kind, Plan};
 
 /// (time, kind, lower id, higher id, partner): compares as [`Event::order`] does; the partner tells the event back.
 type Key = Reverse<(OrderedFloat<f64>, Kind, u32, u32, u32)>;
@@ -14,11 +14,13 @@ type Key = Reverse<(OrderedFloat<f64>, Kind, u32, u32, u32)>;
 #[derive(Clone, Debug, Default)]
 pub struct PlainCalendar {
     queue: PriorityQueue<u32, Key>,
+    plans: Vec<Plan>,
 }
 
 impl Calendar for PlainCalendar {
     fn reserve(&mut self, owners: usize) {
         self.queue.reserve(owners.saturating_sub(self.queue.len()));
+        self.plans.resize(owners.max(self.plans.len()), Plan::default());
     }
 
     fn schedule(&mut self, owner: u32, event: Event) {
@@ -41,5 +43,13 @@ impl Calendar for PlainCalendar {
 
     fn clear(&mut self) {
         self.queue.clear();
+    }
+
+    fn plan(&self, owner: u32) -> &Plan {
+        &self.plans[owner as usize]
+    }
+
+    fn plan_mut(&mut self, owner: u32) -> &mut Plan {
+        &mut self.plans[owner as usize]
     }
 }

@@ -2,16 +2,16 @@
 
 use nalgebra::Vector3;
 
-use crate::calendar::{Buckets, Calendar, Event, Kind};
+use crate::calendar::{Buckets, Calendar, Event, Kind, NOBODY, Plan, never};
 use crate::lists::Lists;
 use crate::neighbors::{Cells, Near};
 use crate::{Bend, Domain, Flight, NoSurface, Outlook, Surface};
 
-mod plan;
+mod search;
 mod sub_step;
 
-pub use self::plan::YIELDING;
-use self::plan::{NO_PLAN, NOBODY, Plan, Search, never};
+use self::search::Search;
+pub use self::search::YIELDING;
 pub use self::sub_step::Touch;
 
 /// What happens next.
@@ -89,7 +89,6 @@ impl Neighbors {
 #[derive(Clone, Debug)]
 pub struct Encounters<S: Surface = NoSurface, C: Calendar = Buckets> {
     flights: Vec<Flight>,
-    plans: Vec<Plan>,
     neighbors: Neighbors,
     calendar: C,
     surface: S,
@@ -136,10 +135,8 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     fn without_pairs(flights: Vec<Flight>, surface: S, domain: Domain) -> Self {
         let mut calendar = C::default();
         calendar.reserve(flights.len());
-        let plans = vec![NO_PLAN; flights.len()];
         Self {
             flights,
-            plans,
             neighbors: Neighbors::Nobody,
             calendar,
             surface,
@@ -190,14 +187,14 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             match event.kind {
                 Kind::Crossing => self.cross(owner, event.time),
                 Kind::Review => {
-                    self.plans[owner as usize].pair = never(Kind::Review);
+                    self.calendar.plan_mut(owner).set_pair(never(Kind::Review));
                     self.find_partner(owner);
                     self.reschedule(owner);
                 }
                 Kind::Grains => {
                     let (a, b) = (owner.min(event.partner), owner.max(event.partner));
-                    self.plans[a as usize].pair = never(Kind::Review);
-                    self.plans[b as usize].pair = never(Kind::Review);
+                    self.calendar.plan_mut(a).set_pair(never(Kind::Review));
+                    self.calendar.plan_mut(b).set_pair(never(Kind::Review));
                     self.advance(a, event.time);
                     self.advance(b, event.time);
                     return Some((event.time, Encounter::Grains { a, b }));
@@ -233,7 +230,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
 
     /// Lets a grain pass through the surface from now on. Takes effect when it is next deflected.
     pub fn pass_through_surface(&mut self, grain: u32) {
-        self.plans[grain as usize].stopped_by_surface = false;
+        self.calendar.plan_mut(grain).pass_through_surface();
     }
 
     /// Takes a grain in and gives its number. Numbers of grains that have been removed are used again.
@@ -248,13 +245,13 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         let grain = self.vacant.pop().unwrap_or(self.flights.len() as u32);
         if grain as usize == self.flights.len() {
             self.flights.push(flight);
-            self.plans.push(NO_PLAN);
+            self.calendar.reserve(self.flights.len());
             if self.under_force {
                 self.accelerations.push(acceleration);
             }
         } else {
             self.flights[grain as usize] = flight;
-            self.plans[grain as usize] = NO_PLAN;
+            *self.calendar.plan_mut(grain) = Plan::default();
             if let Some(before) = self.accelerations.get_mut(grain as usize) {
                 *before = acceleration;
             }
@@ -283,7 +280,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             cells.remove(grain);
         }
         self.flights[grain as usize] = VACANT;
-        self.plans[grain as usize] = NO_PLAN;
+        *self.calendar.plan_mut(grain) = Plan::default();
         self.vacant.push(grain);
     }
 
@@ -384,7 +381,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         };
         self.fill_cells(better, now);
         for grain in self.inside().collect::<Vec<_>>() {
-            self.plans[grain as usize].crossing = self.crossing(grain);
+            self.plan_crossing(grain);
             self.look_at_surface(grain);
             self.find_partner(grain);
             self.reschedule(grain);
@@ -393,8 +390,8 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
 
     fn predict_all(&mut self) {
         self.calendar.clear();
-        for grain in 0..self.flights.len() {
-            self.plans[grain].pair = never(Kind::Review);
+        for grain in 0..self.flights.len() as u32 {
+            self.calendar.plan_mut(grain).set_pair(never(Kind::Review));
         }
         for grain in self.inside().collect::<Vec<_>>() {
             self.predict(grain);
@@ -424,34 +421,33 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
 
     /// Predicts everything that lies before a grain whose motion has changed.
     fn predict(&mut self, grain: u32) {
-        let crossing = self.crossing(grain);
-        let flight = self.flight(grain);
-        let exit = Event { time: self.domain.exit_time(flight), kind: Kind::Exit, partner: NOBODY };
-        let plan = &mut self.plans[grain as usize];
-        (plan.crossing, plan.side, plan.looked_until) = (crossing, exit, f64::NEG_INFINITY);
+        self.plan_crossing(grain);
+        let exit = Event { time: self.domain.exit_time(self.flight(grain)), kind: Kind::Exit, partner: NOBODY };
+        let plan = self.calendar.plan_mut(grain);
+        plan.set_side(exit);
+        plan.set_looked_until(f64::NEG_INFINITY);
         self.look_at_surface(grain);
         self.find_partner(grain);
         self.reschedule(grain);
     }
 
-    /// When a grain leaves its cell.
+    /// Plans when a grain leaves its cell.
     #[inline]
-    fn crossing(&self, grain: u32) -> Event {
-        match &self.neighbors {
-            Neighbors::Cells(cells) => {
-                let crossing = cells.crossing(grain, self.flight(grain));
-                Event { time: crossing.time, kind: Kind::Crossing, partner: u32::from(crossing.axis) }
-            }
-            _ => never(Kind::Crossing),
+    fn plan_crossing(&mut self, grain: u32) {
+        if let Neighbors::Cells(cells) = &self.neighbors {
+            let crossing = cells.crossing(grain, &self.flights[grain as usize]);
+            self.calendar.plan_mut(grain).set_crossing(crossing.time, crossing.axis);
+        } else {
+            self.calendar.plan_mut(grain).set_crossing(f64::INFINITY, 0);
         }
     }
 
     /// Looks for the surface that a grain may hit before it leaves its cell.
     #[inline]
     fn look_at_surface(&mut self, grain: u32) {
-        let plan = &mut self.plans[grain as usize];
-        let until = plan.crossing.time.min(self.horizon);
-        if !plan.stopped_by_surface || plan.looked_until >= until {
+        let plan = self.calendar.plan_mut(grain);
+        let until = plan.crossing().time.min(self.horizon);
+        if !plan.has_to_look(until) {
             return;
         }
         let flight = &self.flights[grain as usize];
@@ -463,12 +459,12 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         };
         match outlook {
             Outlook::Hit { time, element } => {
-                plan.looked_until = f64::INFINITY;
-                if time <= plan.side.time {
-                    plan.side = Event { time, kind: Kind::Surface, partner: element };
+                plan.set_looked_until(f64::INFINITY);
+                if time <= plan.side_time() {
+                    plan.set_side(Event { time, kind: Kind::Surface, partner: element });
                 }
             }
-            Outlook::ClearUntil(time) => plan.looked_until = time,
+            Outlook::ClearUntil(time) => plan.set_looked_until(time),
         }
     }
 
@@ -485,9 +481,9 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     }
 
     #[inline]
-    fn search(&self, grain: u32) -> Search<'_> {
-        let (flight, plan) = (self.flights[grain as usize], &self.plans[grain as usize]);
-        let until = plan.pair.time.min(plan.side.time).min(self.horizon);
+    fn search(&self, grain: u32) -> Search<'_, C> {
+        let (flight, plan) = (self.flights[grain as usize], self.calendar.plan(grain));
+        let until = plan.pair().time.min(plan.side_time()).min(self.horizon);
         Search {
             grain,
             flight,
@@ -495,30 +491,33 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             sag: self.under_force.then_some(self.sag),
             horizon: self.horizon,
             flights: &self.flights,
-            plans: &self.plans,
-            best: plan.pair,
+            calendar: &self.calendar,
+            best: plan.pair(),
         }
     }
 
     /// Puts a meeting into the plans of both grains, and leaves the one that `grain` or its new partner had in mind before.
     fn plan_pair(&mut self, grain: u32, event: Event) {
-        if event.kind != Kind::Grains || event == self.plans[grain as usize].pair {
+        if event.kind != Kind::Grains || event == self.calendar.plan(grain).pair() {
             return;
         }
         let other = event.partner;
         self.release_partner(grain);
         self.release_partner(other);
-        self.plans[grain as usize].pair = event;
-        self.plans[other as usize].pair = Event { partner: grain, ..event };
+        self.calendar.plan_mut(grain).set_pair(event);
+        self.calendar.plan_mut(other).set_pair(Event { partner: grain, ..event });
         self.reschedule(other);
     }
 
     /// Dissolves the planned meeting of a grain. The partner looks again when they would have met: until then nothing else happens to
     /// it, or it would have been planned instead.
     fn release_partner(&mut self, grain: u32) {
-        let event = std::mem::replace(&mut self.plans[grain as usize].pair, never(Kind::Review));
+        let plan = self.calendar.plan_mut(grain);
+        let event = plan.pair();
+        plan.set_pair(never(Kind::Review));
         if event.kind == Kind::Grains {
-            self.plans[event.partner as usize].pair = Event { kind: Kind::Review, partner: 0, ..event };
+            let review = Event { kind: Kind::Review, partner: 0, ..event };
+            self.calendar.plan_mut(event.partner).set_pair(review);
             self.reschedule(event.partner);
         }
     }
@@ -530,8 +529,8 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             // This crossing stays in the calendar, or is forgotten with the old cells.
             return self.think_over_cells(now);
         }
-        let axis = self.plans[grain as usize].crossing.partner as u8;
-        let mut best = self.plans[grain as usize].pair;
+        let plan = self.calendar.plan(grain);
+        let (axis, mut best) = (plan.crossing().partner as u8, plan.pair());
         if let Neighbors::Cells(cells) = &mut self.neighbors {
             let step = cells.cross(grain, &self.flights[grain as usize], axis);
             let mut near = std::mem::take(&mut self.near);
@@ -542,7 +541,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             }
             self.near = near;
         }
-        self.plans[grain as usize].crossing = self.crossing(grain);
+        self.plan_crossing(grain);
         self.look_at_surface(grain);
         self.plan_pair(grain, best);
         self.reschedule(grain);
@@ -550,7 +549,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
 
     #[inline]
     fn reschedule(&mut self, grain: u32) {
-        let first = self.plans[grain as usize].first();
+        let first = self.calendar.plan(grain).first();
         if first.time > self.horizon {
             self.calendar.cancel(grain);
         } else {

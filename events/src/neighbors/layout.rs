@@ -33,6 +33,8 @@ pub(super) struct Layout {
     pub(super) extent: Vector3<f64>,
     /// Steps between the numbers of cells that are adjacent along x, y and z.
     strides: [u32; 3],
+    /// Number of cell (0, 0, 0).
+    pub(super) first_number: u32,
     /// Corner of cell (0, 0, 0) at epoch time 0, m.
     pub(super) corner: Vector3<f64>,
     /// Velocity of that corner, m/s.
@@ -85,12 +87,29 @@ impl Layout {
             Vector3::zeros()
         };
         let strides = if domain.periodic {
-            let [x, y] = [period.x as u32, period.y.max(1) as u32];
-            [1, x, x * y]
+            let [x, y] = [period.x as u32, period.y as u32];
+            // In a planar scene there is nothing along y, and what is never looked at is in range nevertheless.
+            [1, if y > 0 { x } else { 0 }, x * y.max(1)]
         } else {
             SCATTERED
         };
-        Self { size, period, extent, strides, corner, drift, growth, born: now }
+        Self {
+            size,
+            period,
+            extent,
+            strides,
+            first_number: u32::from(domain.periodic),
+            corner,
+            drift,
+            growth,
+            born: now,
+        }
+    }
+
+    /// How many cells are in a period, if there is one.
+    pub(super) fn cells(&self) -> Option<usize> {
+        let along = |axis: usize| self.period[axis].max(1) as usize;
+        (self.period != Vector3::zeros()).then(|| along(0) * along(1) * along(2))
     }
 
     /// What `cells` along `axis` add to the number of a cell.

@@ -18,9 +18,13 @@ use crate::{Domain, Flight};
 
 /// A crossing costs about as much as so many looks at a neighbour (instruction counts of the jet of 8000 grains).
 const LOOKS_PER_CROSSING: f64 = 10.0;
+/// The grid is laid out anew when there are so many times as many grains as it was made for, or as the fewest that are worth it.
+const CROWD: usize = 4;
+const FEWEST_GRAINS: usize = 16;
 /// A new layout costs a look around for every grain: it is taken when it cuts the cost to this fraction.
 const WORTH_A_NEW_LAYOUT: f64 = 0.9;
-const NOBODY: u32 = u32::MAX;
+const NOBODY: u32 = u32::MAX >> 1;
+const TURNED: u32 = 1 << 31;
 
 /// Smallest side (m) that a periodic domain may have for grains of this radius (m): eight radii and a little, or the image that a
 /// grain meets would not be clear.
@@ -34,10 +38,8 @@ pub fn least_period(radius: f64) -> f64 {
 struct Link {
     /// The number of its cell, before it is taken modulo the number of slots: hardly ever that of another cell.
     number: u32,
-    /// The next one.
+    /// The next one, and the bit [`TURNED`] if its own cell lies beyond the period.
     next: u32,
-    /// How many periods its cell lies beyond the period along each axis, in 21 bits each.
-    turns: u64,
 }
 
 /// Grains that are near another one.
@@ -116,6 +118,8 @@ const fn steps(number: usize) -> [i32; 3] {
 pub(crate) struct Cells {
     layout: Layout,
     domain: Domain,
+    /// For so many grains.
+    made_for: usize,
     /// The bits of the 27 cells around a cell that can hold grains which touch one in it.
     around: u32,
     slots: Slots,
@@ -149,7 +153,8 @@ impl Cells {
         // In a planar scene nobody is beside the plane.
         let beside = if domain.planar { AHEAD[1][0] | AHEAD[1][1] } else { 0 };
         let around = ((1 << 27) - 1) & !beside;
-        Self { layout, domain, around, slots: Slots::new(grains), links: Vec::new(), places: Vec::new(), offsets }
+        let slots = Slots::new(layout.cells(), grains, NOBODY);
+        Self { layout, domain, made_for: grains, around, slots, links: Vec::new(), places: Vec::new(), offsets }
     }
 
     /// An empty grid that suits `flights` better, if it is worth its cost; `crossings` and `looks` are what this one took lately.
@@ -180,9 +185,9 @@ impl Cells {
         self.domain.axes().iter().all(|&axis| contact_width(radius) <= self.layout.size[axis])
     }
 
-    /// Whether so many grains would crowd the slots.
+    /// Whether so many grains would crowd the grid.
     pub(crate) fn crowded(&self, grains: usize) -> bool {
-        grains > self.slots.len()
+        grains > CROWD * self.made_for.max(FEWEST_GRAINS)
     }
 
     /// Position relative to the corner of the grid, in the frame that drifts with it.
@@ -208,30 +213,30 @@ impl Cells {
         std::array::from_fn(|number| (0..3).fold(0, |sum: u32, axis| sum.wrapping_add(offset(number, axis))))
     }
 
-    /// The place of a cell, its number and its turns.
+    /// The place of a cell, its number, and [`TURNED`] if it lies beyond the period.
     #[inline]
-    fn place(&self, cell: Vector3<i32>) -> (Place, u32, u64) {
-        let (mut number, mut edges, mut turns) = (0_u32, INSIDE, 0);
+    fn place(&self, cell: Vector3<i32>) -> (Place, u32, u32) {
+        let (mut number, mut edges, mut turned) = (self.layout.first_number, INSIDE, 0);
         for axis in 0..3 {
             let period = self.layout.period[axis];
             let mut home = cell[axis];
             if period > 0 {
                 if home as u32 >= period as u32 {
                     home = home.rem_euclid(period);
-                    turns |= (((cell[axis] - home) / period) as u64 & 0x1F_FFFF) << (21 * axis);
+                    turned = TURNED;
                 }
                 edges += THREE_TO[axis] * u32::from(home + 1 == period);
                 edges -= THREE_TO[axis] * u32::from(home == 0);
             }
             number = number.wrapping_add(self.layout.along(axis, home));
         }
-        (Place { cell, edges }, number, turns)
+        (Place { cell, edges }, number, turned)
     }
 
     /// Puts grain `id` into the cell where it is at `now` (s, epoch time).
     pub(crate) fn insert(&mut self, id: u32, flight: &Flight, now: f64) {
         if self.links.len() <= id as usize {
-            self.links.resize(id as usize + 1, Link { number: 0, next: NOBODY, turns: 0 });
+            self.links.resize(id as usize + 1, Link { number: 0, next: NOBODY });
             self.places.resize(id as usize + 1, NOWHERE);
         }
         self.link(id, self.cell_of(flight.position_at(now), now));
@@ -239,33 +244,39 @@ impl Cells {
 
     #[inline]
     fn link(&mut self, id: u32, cell: Vector3<i32>) {
-        let (place, number, turns) = self.place(cell);
+        let (place, number, turned) = self.place(cell);
         self.places[id as usize] = place;
-        self.links[id as usize] = Link { number, next: self.slots.replace_first(number, id), turns };
+        self.links[id as usize] = Link { number, next: self.slots.replace_first(number, id, NOBODY) | turned };
     }
 
     /// Takes grain `id` out.
     #[inline]
     pub(crate) fn remove(&mut self, id: u32) {
-        let Link { number, next, .. } = self.links[id as usize];
+        let Link { number, next } = self.links[id as usize];
+        let next = next & !TURNED;
         // Few grains share a slot.
         let mut other = self.slots.first(number);
         if other == id {
-            self.slots.replace_first(number, next);
+            self.slots.replace_first(number, next, NOBODY);
             return;
         }
-        while self.links[other as usize].next != id {
-            other = self.links[other as usize].next;
+        loop {
+            let after = &mut self.links[other as usize].next;
+            if *after & !TURNED == id {
+                *after = *after & TURNED | next;
+                return;
+            }
+            other = *after & !TURNED;
         }
-        self.links[other as usize].next = next;
     }
 
     /// Tells the grid that a periodic wrap has moved the stored position of `id` by `shift`.
     pub(crate) fn wrapped(&mut self, id: u32, shift: Vector3<f64>) {
         let turns = shift.component_div(&self.domain.extent()).map(|x| x.round() as i32);
-        let (place, _, turns) = self.place(self.places[id as usize].cell + turns.component_mul(&self.layout.period));
+        let (place, _, turned) = self.place(self.places[id as usize].cell + turns.component_mul(&self.layout.period));
         self.places[id as usize] = place;
-        self.links[id as usize].turns = turns;
+        let next = &mut self.links[id as usize].next;
+        *next = *next & !TURNED | turned;
     }
 
     /// When and through which side `flight` leaves its cell.
@@ -326,13 +337,14 @@ impl Cells {
 
     /// Adds to `near` every grain in the cells around `position`, where there need not be a grain.
     pub(crate) fn add_near(&self, position: Vector3<f64>, time: f64, near: &mut Near) {
-        let (place, number, turns) = self.place(self.cell_of(position, time));
-        self.add(place, Link { number, next: NOBODY, turns }, self.around, near);
+        let (place, number, turned) = self.place(self.cell_of(position, time));
+        self.add(place, Link { number, next: turned }, self.around, near);
     }
 
     /// Adds to `near` every grain in those of the 27 cells around a place whose bits are set.
     fn add(&self, place: Place, link: Link, wanted: u32, near: &mut Near) {
         let offsets = &self.offsets[place.edges as usize];
+        let is_here = place.edges == INSIDE && link.next & TURNED == 0;
         let mut occupied = 0;
         for row in 0..9 {
             let number = link.number.wrapping_add(offsets[3 * row + 1]);
@@ -351,13 +363,13 @@ impl Cells {
             while other != NOBODY {
                 let theirs = self.links[other as usize];
                 if theirs.number == number {
-                    if place.edges == INSIDE && theirs.turns == link.turns {
+                    if is_here && theirs.next & TURNED == 0 {
                         near.here.push(other);
                     } else {
                         near.beyond.push((other, self.shift(other, place.cell, around)));
                     }
                 }
-                other = theirs.next;
+                other = theirs.next & !TURNED;
             }
         }
     }

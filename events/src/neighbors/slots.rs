@@ -13,6 +13,8 @@ pub(super) fn slots(grains: usize) -> usize {
 /// The first grain in each slot, if there is one.
 #[derive(Clone, Debug)]
 pub(super) struct Slots {
+    /// What of the number of a cell tells its slot.
+    mask: usize,
     first: Vec<u32>,
     /// Whether there is a grain in the slot before each slot (bit 0), in it, and in the slot after it (bit 2): so an empty cell costs next to
     /// nothing.
@@ -20,34 +22,34 @@ pub(super) struct Slots {
 }
 
 impl Slots {
-    /// Empty slots for so many grains.
-    pub(super) fn new(grains: usize) -> Self {
-        let slots = slots(grains);
-        Self { first: vec![u32::MAX; slots], occupied: vec![0; slots] }
-    }
-
-    pub(super) fn len(&self) -> usize {
-        self.first.len()
+    /// Empty slots for so many cells of a period, which have the numbers from 1 on, or else for so many grains. `nobody` stands for no grain.
+    pub(super) fn new(cells: Option<usize>, grains: usize, nobody: u32) -> Self {
+        let (slots, mask) = match cells {
+            // The first and the last slot have none beside them.
+            Some(cells) => (cells + 2, usize::MAX),
+            None => (slots(grains), slots(grains) - 1),
+        };
+        Self { mask, first: vec![nobody; slots], occupied: vec![0; slots] }
     }
 
     /// The slot of the cell with this number.
     #[inline]
     fn slot(&self, number: u32) -> usize {
-        number as usize & (self.first.len() - 1)
+        number as usize & self.mask
     }
 
-    /// The first grain in the slot of a cell, or the largest number where there is none.
+    /// The first grain in the slot of a cell, or nobody.
     #[inline]
     pub(super) fn first(&self, number: u32) -> u32 {
         self.first[self.slot(number)]
     }
 
-    /// Makes `grain`, or nobody (the largest number), the first in the slot of a cell; gives the one that was.
+    /// Makes `grain`, or `nobody`, the first in the slot of a cell; gives the one that was.
     #[inline]
-    pub(super) fn replace_first(&mut self, number: u32, grain: u32) -> u32 {
+    pub(super) fn replace_first(&mut self, number: u32, grain: u32, nobody: u32) -> u32 {
         let slot = self.slot(number);
         let before = std::mem::replace(&mut self.first[slot], grain);
-        if (before == u32::MAX) != (grain == u32::MAX) {
+        if (before == nobody) != (grain == nobody) {
             for (step, bit) in [(1, 0), (0, 1), (u32::MAX, 2)] {
                 let beside = self.slot(number.wrapping_add(step));
                 self.occupied[beside] ^= 1 << bit;

@@ -1,61 +1,17 @@
-//! What lies before each grain, and the search for its next partner.
+//! The search for the next partner of a grain.
 
 use nalgebra::Vector3;
 
 use crate::Flight;
-use crate::calendar::{Event, Kind};
+use crate::calendar::{Calendar, Event, Kind};
 use crate::contact_time::{sphere_sphere, sphere_sphere_yielding, spheres_may_touch, spheres_may_touch_two};
 use crate::neighbors::Near;
-
-/// No partner.
-pub(super) const NOBODY: u32 = u32::MAX;
 
 /// By this part of the smaller radius grains that touch under force may overlap before they meet again ([`sphere_sphere_yielding`]).
 pub const YIELDING: f64 = 1e-6;
 
-/// The earliest of each sort of event that lies before a grain.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Plan {
-    /// With another grain ([`Kind::Grains`]) or, where that grain has been deflected meanwhile, a new look ([`Kind::Review`]).
-    pub(super) pair: Event,
-    /// With the surface or a side of the domain.
-    pub(super) side: Event,
-    /// Until when the surface has been looked at, s.
-    pub(super) looked_until: f64,
-    /// Out of its cell, along the axis `partner`.
-    pub(super) crossing: Event,
-    /// Whether the surface stops this grain.
-    pub(super) stopped_by_surface: bool,
-}
-
-pub(super) const fn never(kind: Kind) -> Event {
-    Event { time: f64::INFINITY, kind, partner: NOBODY }
-}
-
-pub(super) const NO_PLAN: Plan = Plan {
-    pair: never(Kind::Review),
-    side: never(Kind::Exit),
-    looked_until: f64::NEG_INFINITY,
-    crossing: never(Kind::Crossing),
-    stopped_by_surface: true,
-};
-
-impl Plan {
-    /// The first of the three; they stand in the order of their kinds, so the earlier one wins where times are equal.
-    #[inline]
-    pub(super) fn first(&self) -> Event {
-        let mut first = self.crossing;
-        for event in [self.pair, self.side] {
-            if event.time < first.time {
-                first = event;
-            }
-        }
-        first
-    }
-}
-
 /// A search for the first grain that `grain` meets.
-pub(super) struct Search<'a> {
+pub(super) struct Search<'a, C> {
     pub(super) grain: u32,
     pub(super) flight: Flight,
     /// Later meetings do not count, s.
@@ -65,12 +21,12 @@ pub(super) struct Search<'a> {
     /// End of the sub-step, s.
     pub(super) horizon: f64,
     pub(super) flights: &'a [Flight],
-    pub(super) plans: &'a [Plan],
+    pub(super) calendar: &'a C,
     /// The best so far.
     pub(super) best: Event,
 }
 
-impl Search<'_> {
+impl<C: Calendar> Search<'_, C> {
     /// The first meeting with one of `near` that comes before all that either of the two has planned, or else what this grain has planned.
     ///
     /// Most of `near` are out of reach. To find out about two of them at once before going on with either is the fastest way.
@@ -115,11 +71,11 @@ impl Search<'_> {
             return;
         }
         let event = Event { time, kind: Kind::Grains, partner: other };
-        let theirs = &self.plans[other as usize];
+        let theirs = self.calendar.plan(other);
         // A meeting comes before the surface and the exit of either where the times are equal: the order of kinds.
         if event.is_before(self.grain, &self.best, self.grain)
-            && event.is_before(self.grain, &theirs.pair, other)
-            && time <= theirs.side.time
+            && event.is_before(self.grain, &theirs.pair(), other)
+            && time <= theirs.side_time()
         {
             (self.best, self.until) = (event, time);
         }
