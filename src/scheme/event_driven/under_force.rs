@@ -203,7 +203,11 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         }
     }
 
-    /// Two grains at rest against each other stay so until the end of the sub-step: what their chords approach is taken away by an impulse.
+    /// Two grains at rest against each other stay so: what their chords approach is turned round by an impulse. At the end of the sub-step it is
+    /// ended, for all contacts at rest at once.
+    ///
+    /// To end it here would leave the pair to be pressed together again by its neighbours, and so on without end: a pile then takes two to four
+    /// times as long to come to rest (docs/contacts-at-rest.md).
     pub(super) fn hold_pair(
         &mut self,
         time: f64,
@@ -215,10 +219,10 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let ids = grains.map(|grain| self.grains[grain as usize].id);
         let [first, second] = bodies;
         let chords = grains.map(|grain| self.encounters.flight(grain).velocity);
-        // They part by a trifle, or their neighbours would press them together again without end.
-        let parting = YIELDING * first.radius.min(second.radius) / self.epoch;
-        let approach = ((chords[0] - chords[1]).dot(&normal) + parting).max(0.0);
-        let impulse = normal * (approach * first.mass * second.mass / (first.mass + second.mass));
+        let approach = (chords[0] - chords[1]).dot(&normal).max(0.0);
+        // They part by a trifle at least, or would be held again and again in no time.
+        let parting = approach.max(YIELDING * first.radius.min(second.radius) / self.epoch);
+        let impulse = normal * ((approach + parting) * first.mass * second.mass / (first.mass + second.mass));
         let after = [first.velocity - impulse / first.mass, second.velocity + impulse / second.mass];
         self.check(time, &ids, overlap_over_radius, &after)?;
         self.force.held.dissipated_grain +=
