@@ -81,8 +81,6 @@ pub struct Substepped<S: Surface, C: Calendar = Tournament> {
     step: f64,
     /// Length of the sub-step that has ended, s.
     ended: f64,
-    /// By how much its middle was earlier than planned, s.
-    missing: f64,
     /// End of the current sub-step, simulated time, s.
     step_end: f64,
     /// What acted on each grain at the last kick, m/s², without what contacts carry.
@@ -252,7 +250,6 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             length,
             step: 0.0,
             ended: 0.0,
-            missing: 0.0,
             step_end,
             pull: Vec::new(),
             end: Vec::new(),
@@ -289,26 +286,10 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             if self.engine.advance(until, &mut (&mut self.passages, &mut *observer), watch)?.is_break() {
                 return Ok(ControlFlow::Break(()));
             }
-            if self.engine.is_pressed() {
-                self.end_early();
-            } else if until >= end {
+            if until >= end {
                 return Ok(ControlFlow::Continue(()));
             }
         }
-    }
-
-    /// Ends the sub-step here and now: from now on it is as if it had been planned so.
-    ///
-    /// What forces give until the middle of a sub-step is in its chords and booked when it begins. The middle is earlier now.
-    fn end_early(&mut self) {
-        let now = self.engine.time();
-        let missing = 0.5 * (self.step_end - now);
-        let (mass, lag, _) = self.engine.lag(now);
-        let given = self.engine.lag(now + missing).1 - lag;
-        self.books.add_impulse(&self.forces, -self.forces.gravity * (mass * missing), -given);
-        self.ended -= 2.0 * missing;
-        self.step_end = now;
-        self.missing = missing;
     }
 
     /// Chooses the length of the next sub-steps.
@@ -383,7 +364,7 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
 
     /// Ends a sub-step and starts the next.
     fn kick(&mut self) -> Result<(), Broken> {
-        let (ended, missing) = (self.ended, std::mem::take(&mut self.missing));
+        let ended = self.ended;
         self.books.held(&self.engine.take_held());
         if !self.passages.gone.is_empty() {
             let (contacts, near_field) = self.work_on(&self.passages.gone);
@@ -403,14 +384,6 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
         engine.start_sub_step(&under, |surface, touches, grains, flights, accelerations| {
             end.clear();
             end.extend_from_slice(accelerations);
-            if missing > 0.0 {
-                for (slot, (flight, grain)) in flights.iter_mut().zip(grains.iter_mut()).enumerate() {
-                    if starts.get(slot).is_some_and(|start| start.id == grain.id) && flight.radius > 0.0 {
-                        flight.velocity -= end[slot] * missing;
-                        books.dissipated_grain += rotate(flight, grain, -resting.angular(slot) * missing);
-                    }
-                }
-            }
             outcome = forces.pull(grains, flights, *strengths, pull);
             accelerations.copy_from_slice(pull);
             let strongest = pull.iter().map(|pull| pull.norm()).fold(0.0, f64::max);

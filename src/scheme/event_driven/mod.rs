@@ -7,6 +7,7 @@ use impinge_events::{Domain, Encounter, Encounters, Flight, Surface};
 use nalgebra::Vector3;
 
 mod collapse;
+mod pressed;
 mod under_force;
 
 use self::collapse::{COLLAPSE_TIME, NO_ROW, Row, SURFACE};
@@ -198,8 +199,6 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
 
     /// Resolves all events up to simulated time `end` (s). When and how often it is called changes nothing of what happens.
     ///
-    /// Under forces it stops earlier where [`is_pressed`](Self::is_pressed) says so.
-    ///
     /// # Errors
     /// A broken invariant: grains that overlap, or a state that is no number.
     pub fn advance(
@@ -233,10 +232,6 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             let now = self.epoch_start + time;
             if self.outrun && !self.force.acts {
                 self.start_epoch(time);
-            }
-            if self.is_pressed() {
-                self.time = now;
-                return Ok(ControlFlow::Continue(()));
             }
             self.since_watch += 1;
             if self.since_watch == ENCOUNTERS_PER_WATCH {
@@ -316,7 +311,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             return Ok(());
         }
         if self.force.acts && (first.velocity - second.velocity).dot(&normal) <= self.force.resting_speed_of_pairs {
-            return self.hold_pair(time, [a, b], [first, second], normal, overlap_over_radius);
+            self.check(time, &ids, overlap_over_radius, &[])?;
+            self.hand_on(time, [a, b], normal);
+            return Ok(());
         }
         let external = self.external([a, b]);
         let mut contact = resolve_pair_under(&self.laws.grain, &first, &second, normal, &external);

@@ -1,11 +1,12 @@
 //! What the engine does where forces act: sub-steps, synchronised kicks, contacts at rest within a sub-step.
 
 use impinge_events::calendar::Calendar;
-use impinge_events::{Flight, Surface, SurfaceContact, Touch, YIELDING};
+use impinge_events::{Flight, Surface, SurfaceContact, Touch};
 use nalgebra::Vector3;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::EventDriven;
+use super::pressed::Pressed;
 use crate::grains::Grain;
 use crate::law::{Body, External, NearField};
 use crate::near_field::Singular;
@@ -15,12 +16,6 @@ use crate::scheme::resting::PAIR_REST;
 /// A contact under force whose approach speed is below this part of what the force gives in a sub-step has come to rest. A bouncing grain then
 /// comes to rest early by this part of a sub-step over 1 - e.
 const STICKING: f64 = 1e-8;
-/// A sub-step ends early once so many contacts a grain, and [`HOLDS`] more, have been held in it. One by one, grains that are pressed together
-/// come to rest as slowly as heat spreads; at a kick that is done for all of them at once, at the price of about so many of these events.
-const HOLDS_PER_GRAIN: f64 = 0.5;
-const HOLDS: f64 = 16.0;
-/// A sub-step that ends before this part of its length makes the next one more patient, twice as much each time: time goes on.
-const HASTY: f64 = 1.0 / 64.0;
 /// What a contact at rest leaves of an acceleration, out of the contact, over the whole of it: enough that rounding turns none of it inwards, or the
 /// contact would be met again and again at the same time.
 const RELIEF: f64 = 1.0 / (1u64 << 48) as f64;
@@ -50,8 +45,6 @@ pub struct Held {
     pub dissipated_grain: f64,
     /// The same at contacts with the surface.
     pub dissipated_surface: f64,
-    /// How many contacts were held.
-    pub contacts: u64,
 }
 
 /// A grain that the surface carries until the end of the sub-step, or until it leaves.
@@ -83,10 +76,8 @@ pub(super) struct UnderForce {
     pub(super) supported: FxHashMap<u32, Support>,
     /// What contacts at rest did since it was last asked.
     pub(super) held: Held,
-    /// How many may be held until the sub-step ends early.
-    holds_left: u64,
-    /// By how much sub-steps are more patient than usual, as a power of two.
-    patience: i32,
+    /// Who pushes whom; kept for its memory.
+    pub(super) pressed: Pressed,
 }
 
 impl<S: Surface, C: Calendar> EventDriven<S, C> {
@@ -99,10 +90,6 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     ) {
         self.force.under = *under;
         let after = self.time - self.epoch_start;
-        let hasty = self.force.acts && after < HASTY * self.epoch;
-        self.force.patience = if hasty { self.force.patience + 1 } else { 0 };
-        let holds = HOLDS + HOLDS_PER_GRAIN * self.encounters.count() as f64;
-        self.force.holds_left = (holds * 2f64.powi(self.force.patience)) as u64;
         self.natural_epoch(after);
         self.force.acts = true;
         let (grains, mut length, mut strongest) = (&mut self.grains, 0.0, 0.0);
@@ -129,12 +116,6 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             self.force.anchors.extend(slots.map(|grain| self.encounters.flight(grain).position));
         }
         self.begin(after, length);
-    }
-
-    /// Whether so many contacts have come to rest that the sub-step should end.
-    #[must_use]
-    pub fn is_pressed(&self) -> bool {
-        self.force.acts && self.force.holds_left == 0
     }
 
     /// What contacts at rest did since it was last taken.
@@ -203,36 +184,6 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         }
     }
 
-    /// Two grains at rest against each other stay so: what their chords approach is turned round by an impulse. At the end of the sub-step it is
-    /// ended, for all contacts at rest at once.
-    ///
-    /// To end it here would leave the pair to be pressed together again by its neighbours, and so on without end: a pile then takes two to four
-    /// times as long to come to rest (docs/contacts-at-rest.md).
-    pub(super) fn hold_pair(
-        &mut self,
-        time: f64,
-        grains: [u32; 2],
-        bodies: [Body; 2],
-        normal: Vector3<f64>,
-        overlap_over_radius: f64,
-    ) -> Result<(), Broken> {
-        let ids = grains.map(|grain| self.grains[grain as usize].id);
-        let [first, second] = bodies;
-        let chords = grains.map(|grain| self.encounters.flight(grain).velocity);
-        let approach = (chords[0] - chords[1]).dot(&normal).max(0.0);
-        // They part by a trifle at least, or would be held again and again in no time.
-        let parting = approach.max(YIELDING * first.radius.min(second.radius) / self.epoch);
-        let impulse = normal * ((approach + parting) * first.mass * second.mass / (first.mass + second.mass));
-        let after = [first.velocity - impulse / first.mass, second.velocity + impulse / second.mass];
-        self.check(time, &ids, overlap_over_radius, &after)?;
-        self.force.held.dissipated_grain +=
-            impulse.dot(&(first.velocity - second.velocity + (after[0] - after[1]))) * 0.5;
-        self.force.held.contacts += 1;
-        self.force.holds_left = self.force.holds_left.saturating_sub(1);
-        self.deflect(&[(grains[0], after[0]), (grains[1], after[1])]);
-        Ok(())
-    }
-
     /// Approach speed (m/s) below which a grain has come to rest against the surface.
     pub(super) fn resting_speed_at_surface(&self, grain: u32) -> f64 {
         let grain = grain as usize;
@@ -264,8 +215,6 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.force.held.impulse_surface += (self.encounters.flight(grain).velocity - chord) * before.mass;
         self.force.held.dissipated_surface +=
             0.5 * before.mass * (before.velocity.norm_squared() - after.norm_squared());
-        self.force.held.contacts += 1;
-        self.force.holds_left = self.force.holds_left.saturating_sub(1);
         Ok(())
     }
 
@@ -287,7 +236,13 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     /// The flight of a grain as it is at its local time: without forces the stored one.
     #[inline]
     pub(super) fn true_flight(&self, grain: u32) -> Flight {
-        let mut flight = *self.encounters.flight(grain);
+        self.true_flight_at(grain, self.encounters.flight(grain).time)
+    }
+
+    /// The flight of a grain as it will be at `time` (s, epoch time), if nothing happens to it until then.
+    #[inline]
+    pub(super) fn true_flight_at(&self, grain: u32, time: f64) -> Flight {
+        let mut flight = self.encounters.flight(grain).advanced_to(time);
         if self.force.acts {
             let bend = self.encounters.bend(grain);
             flight.position += bend.offset(flight.time);
