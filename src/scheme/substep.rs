@@ -13,7 +13,7 @@ use impinge_events::{Domain, Flight, Surface};
 use nalgebra::Vector3;
 use rustc_hash::FxHashMap;
 
-use super::event_driven::{Held, Under};
+use super::event_driven::{AtRest, Held, Under};
 use super::resting::Resting;
 use super::{Broken, EventDriven, Kick, Laws, Observer, Passage, Progress, Rest};
 use crate::grains::{Grain, NewGrain, kinetic_energy};
@@ -75,6 +75,7 @@ pub struct Substepped<S: Surface, C: Calendar = Tournament> {
     engine: EventDriven<S, C>,
     forces: Forces,
     laws: Laws,
+    at_rest: AtRest,
     resting: Resting,
     length: Length,
     /// Length of a sub-step, s.
@@ -246,6 +247,7 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             engine,
             forces,
             laws,
+            at_rest: AtRest::default(),
             resting: Resting::default(),
             length,
             step: 0.0,
@@ -265,6 +267,14 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             Length::Within(_) => 0.0,
         };
         scheme
+    }
+
+    /// Treats contacts that forces press together in another way, so that it can be compared.
+    #[must_use]
+    pub fn treating(mut self, at_rest: AtRest) -> Self {
+        self.engine.treat(at_rest);
+        self.at_rest = at_rest;
+        self
     }
 
     /// Resolves all events up to simulated time `end` (s). When and how often it is called changes nothing of what happens.
@@ -372,7 +382,8 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             self.books.work_near_field += near_field;
             self.passages.gone.clear();
         }
-        let Self { engine, forces, laws, resting, pull, starts, end, domain, books, step, strengths, .. } = self;
+        let Self { engine, forces, laws, at_rest, resting, pull, starts, end, domain, books, step, strengths, .. } =
+            self;
         let step = *step;
         let strongest = pull.iter().map(|pull| pull.norm()).fold(forces.gravity.norm(), f64::max);
         let reach = Resting::reach(engine.largest_radius(), 2.0 * strongest, step);
@@ -387,7 +398,9 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             outcome = forces.pull(grains, flights, *strengths, pull);
             accelerations.copy_from_slice(pull);
             let strongest = pull.iter().map(|pull| pull.norm()).fold(0.0, f64::max);
-            resting.find(surface, touches, grains, flights, pull, step, [&laws.grain, &laws.surface]);
+            if *at_rest == AtRest::Carried {
+                resting.find(surface, touches, grains, flights, pull, step, [&laws.grain, &laws.surface]);
+            }
             let both = 0.5 * (ended + step);
             if !resting.is_empty() {
                 resting.carry(grains, flights, accelerations, step);

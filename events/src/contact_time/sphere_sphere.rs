@@ -54,7 +54,7 @@ pub fn sphere_sphere(a: &Flight, b: &Flight, shift: Vector3<f64>) -> Option<f64>
 }
 
 /// Spheres under force overlap by no more than this many times the slack of [`sphere_sphere_yielding`] before they meet.
-pub const MOST_SLACKS: f64 = 8.0;
+pub const MOST_SLACKS: f64 = 4.0;
 
 /// As [`sphere_sphere`] for spheres under force, which may press against each other: a pair that touches already, nearer than ¼ `slack` (m), meets only where
 /// its overlap would grow by `slack`, or beyond [`MOST_SLACKS`] times as much, until `horizon` (s, epoch time), the end of the sub-step.

@@ -72,7 +72,8 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let mut pressed = std::mem::take(&mut self.force.pressed);
         let resting = self.force.resting_speed_of_pairs;
         // These two part by a trifle, or would be held again and again in no time.
-        let may = -YIELDING * self.encounters.flight(grains[0]).radius / self.epoch;
+        let trifle = YIELDING * self.encounters.flight(grains[0]).radius / self.epoch;
+        let may = -trifle.min(KEPT * resting);
         let [first, second] = grains.map(|grain| self.member(&mut pressed, time, grain));
         pressed.contacts.push(Contact { first, second, normal, may, origin: true });
         for grain in grains {
@@ -130,7 +131,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     /// Gives all that were pushed their new velocities.
     fn move_on(&mut self, time: f64, pressed: &Pressed) {
         let mut chords = Vec::with_capacity(pressed.members.len());
-        for member in pressed.members.iter().filter(|member| member.now != member.before) {
+        // The two that met are predicted anew in any case: their meeting is over.
+        let moved = |&(number, member): &(usize, &Member)| number < 2 || member.now != member.before;
+        for (_, member) in pressed.members.iter().enumerate().filter(moved) {
             self.encounters.bring(member.grain, time);
             let velocity = member.now + member.bent;
             self.let_go(member.grain, velocity);

@@ -19,6 +19,20 @@ const STICKING: f64 = 1e-8;
 /// What a contact at rest leaves of an acceleration, out of the contact, over the whole of it: enough that rounding turns none of it inwards, or the
 /// contact would be met again and again at the same time.
 const RELIEF: f64 = 1.0 / (1u64 << 48) as f64;
+/// What becomes of a contact that forces press together. [`Carried`](Self::Carried) is how runs are done; the others are there to be compared with
+/// it (`examples/rest_treatments.rs`, docs/contacts-at-rest.md).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum AtRest {
+    /// Below what forces give in a few sub-steps it sticks, and contact forces carry it.
+    #[default]
+    Carried,
+    /// Below that speed it is elastic; nothing sticks or is carried.
+    Elastic,
+    /// It collides by its law, but a hit within 0.001 radii of flight (of the fastest grain) of the one before is elastic: the TC model (Luding &
+    /// McNamara 1998).
+    Colliding,
+}
+
 /// What acts in a sub-step.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::scheme) struct Under {
@@ -59,6 +73,7 @@ pub(super) struct Support {
 /// What the engine keeps of forces.
 #[derive(Clone, Debug, Default)]
 pub(super) struct UnderForce {
+    pub(super) at_rest: AtRest,
     /// Whether they act: then the epoch is a sub-step, and somebody else says when the next one starts.
     pub(super) acts: bool,
     pub(super) under: Under,
@@ -108,6 +123,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let sticks = self.laws.grain.restitution < 1.0;
         self.force.resting_speed_of_pairs =
             if sticks { PAIR_REST * strongest * length } else { self.force.resting_speed };
+        if self.force.at_rest == AtRest::Colliding {
+            (self.force.resting_speed, self.force.resting_speed_of_pairs) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+        }
         self.force.anchors.clear();
         self.force.synchronised.clear();
         self.force.supported.clear();
@@ -116,6 +134,11 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             self.force.anchors.extend(slots.map(|grain| self.encounters.flight(grain).position));
         }
         self.begin(after, length);
+    }
+
+    /// Chooses what becomes of contacts that forces press together.
+    pub(in crate::scheme) fn treat(&mut self, at_rest: AtRest) {
+        self.force.at_rest = at_rest;
     }
 
     /// What contacts at rest did since it was last taken.
