@@ -135,14 +135,10 @@ fn surface(side: Option<f64>) -> Result<Surface, Box<dyn Error>> {
 
 /// Follows a case until its end, or until it has taken `budget` of processor time.
 fn run(case: &Case, at_rest: AtRest, step: f64, budget: Duration) -> Result<Outcome, Box<dyn Error>> {
-    let laws = Laws {
-        grain: case.law.clone(),
-        surface: case.law.clone(),
-        interference: Interference::All,
-        collapse: Collapse::Elastic,
-    };
+    let laws =
+        Laws { grain: case.law, surface: case.law, interference: Interference::All, collapse: Collapse::Elastic };
     let domain = Domain::unbounded();
-    let engine = EventDriven::new(&case.grains, surface(case.side)?, domain, laws.clone(), 0.0);
+    let engine = EventDriven::new(&case.grains, surface(case.side)?, domain, laws, 0.0);
     let attraction = NearField::new(Term { alpha: case.alpha, beta: 2.0 }, Term { alpha: 0.0, beta: 3.0 })?;
     let near_field = (case.alpha > 0.0).then(|| ForceSum::new(attraction, Method::Direct, &domain)).transpose()?;
     let forces = Forces { gravity: Vector3::z() * -case.gravity, near_field, contact_time: 0.0 };
