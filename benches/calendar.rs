@@ -6,7 +6,7 @@
 mod support;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use impinge_events::calendar::{Calendar, Event, Kind, PlainCalendar, Tournament};
+use impinge_events::calendar::{Buckets, Calendar, Event, Kind, PlainCalendar};
 use rand::SeedableRng as _;
 use rand_distr::{Distribution as _, Exp1};
 use rand_pcg::Pcg64;
@@ -36,7 +36,7 @@ fn hold<C: Calendar>(c: &mut Criterion, name: &str, owners: u32) {
 
 fn calendar(c: &mut Criterion) {
     for owners in [1_000, 10_000, 100_000] {
-        hold::<Tournament>(c, "fast", owners);
+        hold::<Buckets>(c, "fast", owners);
         hold::<PlainCalendar>(c, "plain", owners);
     }
 }

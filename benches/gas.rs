@@ -14,7 +14,7 @@ use impinge::law::{ContactLaw, Friction};
 use impinge::scene::{Interference, Scene};
 use impinge::scheme::{Collapse, EventDriven, Laws};
 use impinge::{simulation, source};
-use impinge_events::calendar::{Calendar, PlainCalendar, Tournament};
+use impinge_events::calendar::{Buckets, Calendar, PlainCalendar};
 use impinge_events::{Domain, NoSurface};
 use support::{Duel, advance, duel, trial};
 
@@ -90,11 +90,11 @@ fn lattice(cells: u32, fraction: f64) -> Scene {
     .expect("a scene")
 }
 
-fn melted(cells: u32, fraction: f64) -> (Gas<Tournament>, Gas<PlainCalendar>) {
+fn melted(cells: u32, fraction: f64) -> (Gas<Buckets>, Gas<PlainCalendar>) {
     let scene = lattice(cells, fraction);
     let domain = simulation::domain(&scene);
     let mut grains = source::place(&scene, ".".as_ref(), &|_, _| None).expect("a lattice").grains;
-    let mut fast = Gas::<Tournament>::new(&grains, domain, fraction);
+    let mut fast = Gas::<Buckets>::new(&grains, domain, fraction);
     fast.collide(MELTING / 2.0 * grains.len() as f64);
     fast.engine.snapshot(fast.engine.time(), |snapshot| {
         for (grain, flight) in grains.iter_mut().zip(snapshot.flights) {

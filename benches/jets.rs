@@ -12,7 +12,7 @@ use impinge::scene::{self, Interference, PlaneSurface, RectangleSurface, Scene};
 use impinge::scheme::{Collapse, EventDriven, Laws};
 use impinge::source;
 use impinge::surface::Surface;
-use impinge_events::calendar::{Calendar, PlainCalendar, Tournament};
+use impinge_events::calendar::{Buckets, Calendar, PlainCalendar};
 use impinge_events::{Domain, Flight, Outlook, SurfaceContact};
 use support::{Duel, advance, duel, trial};
 
@@ -95,13 +95,13 @@ fn jets(c: &mut Criterion) {
     let mut table = Vec::new();
     for count in [2000, 8000] {
         let grains = jet(count);
-        let fast = || run::<Tournament>(&grains, &plane);
+        let fast = || run::<Buckets>(&grains, &plane);
         let plain = || run::<PlainCalendar>(&grains, &plane);
         c.bench_function(&format!("jet of {count}/fast"), |b| b.iter(fast));
         c.bench_function(&format!("jet of {count}/plain"), |b| b.iter(plain));
         table.push((format!("jet of {count}, plain calendar"), duel(rounds, fast, plain)));
         if count == 8000 {
-            let on_mesh = || run::<Tournament>(&grains, &mesh);
+            let on_mesh = || run::<Buckets>(&grains, &mesh);
             c.bench_function(&format!("jet of {count}/{} triangles", mesh.elements()), |b| b.iter(on_mesh));
             table.push((format!("jet of {count}, {} triangles", mesh.elements()), duel(rounds, fast, on_mesh)));
         }

@@ -7,7 +7,7 @@ use impinge::law::{Body, ContactLaw, Friction, resolve_pair, resolve_surface};
 use impinge::scene::{self, Interference};
 use impinge::scheme::{Collapse, EventDriven, GrainCollision, Laws, Observer, SurfaceHit};
 use impinge::surface::Surface;
-use impinge_events::calendar::{Calendar, PlainCalendar, Tournament};
+use impinge_events::calendar::{Buckets, Calendar, PlainCalendar};
 use impinge_events::contact_time::sphere_sphere;
 use impinge_events::{Domain, Flight, Outlook, Surface as _};
 use nalgebra::Vector3;
@@ -338,7 +338,7 @@ fn periodic_gas_of_unequal_rough_grains() {
     let domain = cube(2.0, true, false);
     let grains = scatter(&mut random, &domain, 40, |r| r.random_range(0.1..0.45), 1.0);
     let case = Case { grains, surface: vec![], domain, laws: laws(1.0, ROUGH) };
-    assert!(compare::<Tournament>(&case, 1e9, 3000) >= 3000);
+    assert!(compare::<Buckets>(&case, 1e9, 3000) >= 3000);
     let case = Case { laws: laws(0.9, Friction::Smooth), ..case };
     assert!(compare::<PlainCalendar>(&case, 1e9, 1500) >= 1500);
 }
@@ -349,7 +349,7 @@ fn planar_periodic_gas() {
     let domain = cube(3.0, true, true);
     let grains = scatter(&mut random, &domain, 30, |r| r.random_range(0.2..0.5), 1.0);
     let case = Case { grains, surface: vec![], domain, laws: laws(0.99, ROUGH) };
-    assert!(compare::<Tournament>(&case, 1e9, 1000) >= 1000);
+    assert!(compare::<Buckets>(&case, 1e9, 1000) >= 1000);
 }
 
 #[test]
@@ -362,7 +362,7 @@ fn open_domain_with_meshes_and_moving_planes() {
         let grains = scatter(&mut random, &inner, 60, |r| r.random_range(0.05..0.3), 1.0);
         let case = Case { grains, surface: mesh_floor(), domain, laws: laws(0.8, ROUGH) };
         events += if seed % 2 == 0 {
-            compare::<Tournament>(&case, 20.0, 10_000)
+            compare::<Buckets>(&case, 20.0, 10_000)
         } else {
             compare::<PlainCalendar>(&case, 20.0, 10_000)
         };
@@ -395,7 +395,7 @@ fn hundredfold(events: usize) {
     let clear: Vec<NewGrain> = small.iter().filter(clear).copied().collect();
     grains.extend(clear);
     let case = Case { grains, surface: vec![], domain, laws: laws(1.0, ROUGH) };
-    assert!(compare::<Tournament>(&case, 1e9, events) >= events);
+    assert!(compare::<Buckets>(&case, 1e9, events) >= events);
 }
 
 /// The same scene twice, with the plain and the fast calendar, observed seldom and often: equal bits.
@@ -421,8 +421,8 @@ fn calendar_and_observation_do_not_change_a_bit() {
     assert!(plain.0.0.len() > 5000);
     for other in [
         run::<PlainCalendar>(&grains, domain, laws, 1),
-        run::<Tournament>(&grains, domain, laws, 1),
-        run::<Tournament>(&grains, domain, laws, 500),
+        run::<Buckets>(&grains, domain, laws, 1),
+        run::<Buckets>(&grains, domain, laws, 500),
     ] {
         assert!(other.0.0 == plain.0.0, "the events differ");
         assert!(other.1 == plain.1, "the final states differ");

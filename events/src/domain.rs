@@ -61,8 +61,11 @@ impl Domain {
     pub fn wrap(&self, position: &mut Vector3<f64>) {
         if self.periodic {
             for &axis in self.axes() {
-                let length = self.max[axis] - self.min[axis];
-                position[axis] -= ((position[axis] - self.min[axis]) / length).floor() * length;
+                let (low, high) = (self.min[axis], self.max[axis]);
+                // Most are inside, and stay what they are.
+                if !(low..high).contains(&position[axis]) {
+                    position[axis] -= ((position[axis] - low) / (high - low)).floor() * (high - low);
+                }
             }
         }
     }
@@ -74,7 +77,10 @@ impl Domain {
         if self.periodic {
             for &axis in self.axes() {
                 let length = self.max[axis] - self.min[axis];
-                apart[axis] -= (apart[axis] / length).round() * length;
+                // Most are near, and stay what they are.
+                if apart[axis].abs() > 0.25 * length {
+                    apart[axis] -= (apart[axis] / length).round() * length;
+                }
             }
         }
         apart

@@ -9,7 +9,7 @@
 use nalgebra::Vector3;
 
 use crate::Flight;
-use crate::neighbors::Cells;
+use crate::neighbors::{Cells, Near};
 
 /// Sub-steps that a list should serve, by the fastest grain: more make longer lists.
 const SUB_STEPS: f64 = 12.0;
@@ -61,15 +61,17 @@ impl Lists {
             room: 0.5 * skin,
             age: 0.0,
         };
+        let mut near = Near::default();
         for (grain, flight) in flights.iter().enumerate() {
             if flight.radius > 0.0 {
-                cells.visit_around(grain as u32, |other, shift| {
+                near.clear();
+                cells.add_around(grain as u32, &mut near);
+                lists.others.extend(near.iter().filter(|&(other, shift)| {
                     let theirs = &flights[other as usize];
                     let reach = flight.radius + theirs.radius + skin;
-                    if (theirs.position + shift - flight.position).norm_squared() < reach * reach {
-                        lists.others.push((other, shift));
-                    }
-                });
+                    let apart = theirs.position + shift - flight.position;
+                    other != grain as u32 && apart.norm_squared() < reach * reach
+                }));
             }
             lists.starts.push(lists.others.len() as u32);
         }

@@ -1,7 +1,7 @@
 //! The bound that spares most pairs their root never says no where there is a contact.
 
 use impinge_events::Flight;
-use impinge_events::contact_time::{sphere_sphere, spheres_may_touch};
+use impinge_events::contact_time::{sphere_sphere, spheres_may_touch, spheres_may_touch_two};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
@@ -86,11 +86,16 @@ proptest! {
     #[test]
     fn a_pair_that_meets_may_touch(meeting in meetings(), later in 0.0..2.0f64) {
         let ([a, b], _) = meeting.flights();
+        let far = Flight { position: b.position * 1e9, ..b };
         for (a, b) in [(a, b), (b, a)] {
             if let Some(time) = sphere_sphere(&a, &b, Vector3::zeros()) {
                 // Until the very time of contact, and until some time after it.
                 for until in [time, time + later * time.abs()] {
                     prop_assert!(spheres_may_touch(&a, &b, Vector3::zeros(), until), "{a:?}, {b:?}: {time} s");
+                    // Whoever stands beside it, be it far away.
+                    for (two, bit) in [([&b, &far], 1), ([&far, &b], 2)] {
+                        prop_assert!(spheres_may_touch_two(&a, two, until) & bit != 0, "{a:?}, {b:?}: {time} s");
+                    }
                 }
             }
         }
@@ -103,6 +108,7 @@ proptest! {
         let b = Flight { position: normal * (reach * (1.0 - overlap)), time, velocity, radius: 0.7 * reach };
         if let Some(time) = sphere_sphere(&a, &b, Vector3::zeros()) {
             prop_assert!(spheres_may_touch(&a, &b, Vector3::zeros(), time), "{a:?}, {b:?}");
+            prop_assert_eq!(spheres_may_touch_two(&a, [&b; 2], time), 0b11, "{:?}, {:?}", a, b);
         }
     }
 }

@@ -87,6 +87,30 @@ impl NearField {
         apart * self.force_over_distance(apart.norm_squared())
     }
 
+    /// Force (N) on a grain whose partner is at `apart` (m) from it and moves away at `velocity` (m/s), and the rate (N/s) at which it changes.
+    ///
+    /// ```
+    /// use impinge::law::{NearField, Term};
+    /// use nalgebra::Vector3;
+    ///
+    /// let law = NearField::new(Term { alpha: 1.0, beta: 2.0 }, Term { alpha: 0.5, beta: 3.0 })?;
+    /// let (apart, velocity) = (Vector3::new(1.0, 0.5, 0.0), Vector3::new(0.3, 0.0, 1.0));
+    /// let [force, rate] = law.force_and_rate_on(apart, velocity);
+    /// assert_eq!(force, law.force_on(apart));
+    /// let change = law.force_on(apart + velocity * 1e-6) - law.force_on(apart - velocity * 1e-6);
+    /// assert!((rate - change / 2e-6).norm() < 1e-9);
+    /// # Ok::<(), impinge::law::InvalidTerm>(())
+    /// ```
+    #[must_use]
+    pub fn force_and_rate_on(&self, apart: Vector3<f64>, velocity: Vector3<f64>) -> [Vector3<f64>; 2] {
+        let r2 = apart.norm_squared();
+        let [attraction, repulsion] = with_radial!(self, radial => radial.terms(r2));
+        let over_distance = attraction - repulsion;
+        // d/dt alpha r^-(beta + 1) = -(beta + 1) alpha r^-(beta + 1) (r.v) / r²
+        let fading = (self.attraction.beta + 1.0) * attraction - (self.repulsion.beta + 1.0) * repulsion;
+        [apart * over_distance, velocity * over_distance - apart * (fading * apart.dot(&velocity) / r2)]
+    }
+
     /// Potential energy of a pair at distance `r`, J; the force towards the partner is its derivative.
     ///
     /// A term with beta > 1 is zero at infinity. One with beta < 1 grows without bound there and is zero at r = 0; one with
@@ -112,6 +136,11 @@ impl NearField {
     pub(crate) fn magnitude_at<R: Radial>(radial: R, r2: f64) -> f64 {
         let [attraction, repulsion] = radial.terms(r2);
         attraction.abs() + repulsion.abs()
+    }
+
+    /// Magnitudes of attraction and repulsion at distance `r`, N.
+    pub(crate) fn magnitudes(&self, r: f64) -> [f64; 2] {
+        with_radial!(self, radial => radial.terms(r * r)).map(|term| term.abs() * r)
     }
 
     /// Sum of the magnitudes of both terms at distance `r`, N.

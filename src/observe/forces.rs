@@ -14,6 +14,7 @@ pub struct Forces {
     work_near_field: Sum,
     impulse_near_field: VectorSum,
     rest_impulse: VectorSum,
+    rest_work_surface: Sum,
     rest_dissipated_grain: Sum,
     rest_dissipated_surface: Sum,
     rest_added: Sum,
@@ -72,6 +73,12 @@ impl Forces {
         self.rest_impulse.value()
     }
 
+    /// Work that moving surfaces did on grains at rest on them, J.
+    #[must_use]
+    pub fn rest_work_surface(&self) -> f64 {
+        self.rest_work_surface.value()
+    }
+
     /// Energy dissipated in resting contacts between grains, J.
     #[must_use]
     pub fn rest_dissipated_grain(&self) -> f64 {
@@ -120,6 +127,8 @@ impl Forces {
 
     pub(super) fn rest(&mut self, rest: &Rest) {
         self.rest_impulse += rest.impulse_surface;
+        self.rest_work_surface += rest.work_surface;
+        self.note_exchange(self.rest_work_surface());
         self.rest_dissipated_grain += rest.dissipated_grain;
         self.rest_dissipated_surface += rest.dissipated_surface;
         self.rest_added += rest.added;

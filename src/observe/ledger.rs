@@ -148,10 +148,10 @@ impl Ledger {
         self.withheld.value()
     }
 
-    /// Work that moving surfaces did on grains, J.
+    /// Work that moving surfaces did on grains, on those that hit them and on those that rest on them, J.
     #[must_use]
     pub fn work_surface(&self) -> f64 {
-        self.work_surface.value()
+        self.work_surface.value() + self.of_forces(Forces::rest_work_surface)
     }
 
     /// Momentum that the surface gave to grains, to those that hit it and to those that rest on it, N s.

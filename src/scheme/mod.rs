@@ -195,6 +195,8 @@ pub struct Rest {
     pub time: f64,
     /// Momentum that grains at rest on the surface got from it since the last kick, N s.
     pub impulse_surface: Vector3<f64>,
+    /// Work of a moving surface on grains at rest on it since the last kick, J.
+    pub work_surface: f64,
     /// Kinetic energy dissipated in resting contacts between grains since the last kick, J.
     pub dissipated_grain: f64,
     /// The same in those with the surface, J.

@@ -109,7 +109,9 @@ pub(super) struct Resting {
 pub(super) struct Settled {
     /// Impulse of the surface on grains, N s.
     pub(super) impulse_surface: Vector3<f64>,
-    /// Kinetic energy taken, J.
+    /// Work of a moving surface, J.
+    pub(super) work_surface: f64,
+    /// Energy taken, J.
     pub(super) dissipated: f64,
 }
 
@@ -362,7 +364,8 @@ impl Resting {
             }
         }
         settled.impulse_surface = self.force_of_surface();
-        settled.dissipated = before - energy(grains, flights);
+        settled.work_surface = self.power_of_surface();
+        settled.dissipated = before + settled.work_surface - energy(grains, flights);
         for (contact, force) in self.contacts.iter_mut().zip(&forces) {
             contact.force = *force;
         }
@@ -380,7 +383,16 @@ impl Resting {
 
     /// Force of the surface on all grains at rest, N.
     pub(super) fn force_of_surface(&self) -> Vector3<f64> {
-        self.contacts.iter().filter(|contact| contact.first == self.surface).map(|contact| contact.force).sum()
+        self.at_surface().map(|contact| contact.force).sum()
+    }
+
+    /// Power of a moving surface on all grains at rest, W.
+    pub(super) fn power_of_surface(&self) -> f64 {
+        self.at_surface().map(|contact| contact.force.dot(&contact.velocity)).sum()
+    }
+
+    fn at_surface(&self) -> impl Iterator<Item = &Contact> {
+        self.contacts.iter().filter(|contact| contact.first == self.surface)
     }
 }
 

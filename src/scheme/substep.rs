@@ -8,7 +8,7 @@
 
 use std::ops::ControlFlow;
 
-use impinge_events::calendar::{Calendar, Tournament};
+use impinge_events::calendar::{Buckets, Calendar};
 use impinge_events::{Domain, Flight, Surface};
 use nalgebra::Vector3;
 use rustc_hash::FxHashMap;
@@ -17,7 +17,7 @@ use super::event_driven::{AtRest, Held, Under};
 use super::resting::Resting;
 use super::{Broken, EventDriven, Kick, Laws, Observer, Passage, Progress, Rest};
 use crate::grains::{Grain, NewGrain, kinetic_energy};
-use crate::near_field::{ForceSum, MeasuredError, Singular};
+use crate::near_field::{ForceSum, MeasuredError, Method, Singular};
 use crate::sum::{Sum, VectorSum};
 
 /// What acts on grains between events.
@@ -71,7 +71,7 @@ const ATTEMPTS: u32 = 40;
 
 /// Grains under forces, advanced in sub-steps from event to event.
 #[derive(Clone, Debug)]
-pub struct Substepped<S: Surface, C: Calendar = Tournament> {
+pub struct Substepped<S: Surface, C: Calendar = Buckets> {
     engine: EventDriven<S, C>,
     forces: Forces,
     laws: Laws,
@@ -145,11 +145,10 @@ impl Start {
     ) -> (f64, f64) {
         let Change { end, pull, carried } = *change;
         let mean = velocity + (end + pull + carried) * (0.25 * step);
-        // Without a near field all that was added within the sub-step came from contacts.
-        let no_near_field = pull == gravity && self.pull == gravity;
-        let carried_end = if no_near_field { end - gravity } else { self.carried };
+        // What was added within the sub-step came from contacts.
+        let carried_end = end - self.pull;
         let contacts = self.carried.dot(&moved) + (carried - carried_end).dot(&mean) * (0.5 * step);
-        let near_field = (self.pull - gravity).dot(&moved) + (pull + carried_end - end).dot(&mean) * (0.5 * step);
+        let near_field = (self.pull - gravity).dot(&moved) + (pull - self.pull).dot(&mean) * (0.5 * step);
         (contacts, near_field)
     }
 }
@@ -164,6 +163,7 @@ struct Books {
     impulse_surface: VectorSum,
     dissipated_grain: Sum,
     dissipated_surface: Sum,
+    work_surface: Sum,
     work_near_field: Sum,
     /// m g·x of grains that left, less that of grains that entered, J.
     carried_away: f64,
@@ -185,6 +185,7 @@ impl Books {
         let surface = self.dissipated_surface.value() - told.dissipated_surface.value();
         let rest = Rest {
             impulse_surface: self.impulse_surface.value() - told.impulse_surface.value(),
+            work_surface: self.work_surface.value() - told.work_surface.value(),
             dissipated_grain: grains.max(0.0),
             dissipated_surface: surface.max(0.0),
             added: (-grains).max(0.0) + (-surface).max(0.0),
@@ -203,10 +204,17 @@ impl Books {
         }
     }
 
+    /// Adds what a moving surface gives to contacts at rest (J): what grains do not have of it in the end is dissipated.
+    fn add_work_of_surface(&mut self, work: f64) {
+        self.work_surface += work;
+        self.dissipated_grain += work;
+    }
+
     fn held(&mut self, held: &Held) {
         self.impulse_surface += held.impulse_surface;
         self.dissipated_grain += held.dissipated_grain;
         self.dissipated_surface += held.dissipated_surface;
+        self.work_surface += held.work_surface;
         self.impulse_gravity += held.impulse_gravity;
         self.impulse_near_field += held.impulse_near_field;
     }
@@ -375,7 +383,12 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
     /// Ends a sub-step and starts the next.
     fn kick(&mut self) -> Result<(), Broken> {
         let ended = self.ended;
-        self.books.held(&self.engine.take_held());
+        let held = self.engine.take_held();
+        self.books.held(&held);
+        // What carried grains ends here. `Start::work` cannot tell it from contacts between grains.
+        let ends = held.power_surface * (0.5 * ended);
+        self.books.dissipated_grain += -ends;
+        self.books.dissipated_surface += ends;
         if !self.passages.gone.is_empty() {
             let (contacts, near_field) = self.work_on(&self.passages.gone);
             self.books.dissipated_grain += -contacts;
@@ -391,7 +404,8 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
         // Where contact lies within the switch of a cut-off, the force at contact is not that of the law: then that of the kick is kept.
         let plain_at_contact = |sum: &&ForceSum| sum.is_plain_within(2.0 * engine.largest_radius());
         let near_field = forces.near_field.as_ref().filter(plain_at_contact).map(|sum| *sum.law());
-        let under = Under { reach, gravity, near_field, contact_time: forces.contact_time };
+        let all_pairs = forces.near_field.as_ref().is_some_and(|sum| sum.method() == Method::Direct);
+        let under = Under { reach, gravity, near_field, all_pairs, contact_time: forces.contact_time };
         engine.start_sub_step(&under, |surface, touches, grains, flights, accelerations| {
             end.clear();
             end.extend_from_slice(accelerations);
@@ -405,6 +419,7 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             if !resting.is_empty() {
                 resting.carry(grains, flights, accelerations, step);
                 books.impulse_surface += resting.force_of_surface() * both;
+                books.add_work_of_surface(resting.power_of_surface() * both);
             }
             starts.resize(flights.len(), NOBODY);
             for (slot, flight) in flights.iter_mut().enumerate().filter(|(_, flight)| flight.radius > 0.0) {
@@ -427,6 +442,7 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             }
             let settled = resting.settle(grains, flights, strongest * step);
             books.impulse_surface += settled.impulse_surface;
+            books.work_surface += settled.work_surface;
             books.dissipated_grain += settled.dissipated;
             for (flight, acceleration) in flights.iter_mut().zip(&*accelerations) {
                 flight.velocity += acceleration * (0.5 * step);
@@ -447,8 +463,10 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
     /// Grains between which there is no finite force.
     pub fn tell(&mut self, time: f64, observer: &mut impl Observer) -> Result<(), Broken> {
         let mut books = self.books;
-        books.held(&self.engine.held());
+        let held = self.engine.held(time);
+        books.held(&held);
         let (mass, lag, in_step) = self.engine.lag(time);
+        books.add_work_of_surface((self.resting.power_of_surface() + held.power_surface) * in_step);
         books.add_impulse(&self.forces, self.forces.gravity * (mass * in_step), lag);
         books.carried_away = self.passages.depth(self.forces.gravity);
         let (contacts, near_field) = self.work_in_step(time);

@@ -1,14 +1,14 @@
 //! The calendar: the predicted events in time order, one for each owner.
 //!
 //! Every event has a place in one total order (time, kind, ids), never that of insertion; so a run does not depend on which
-//! calendar keeps its events. [`PlainCalendar`] is the obvious one, [`Tournament`] the fast one, and the tests hold the
+//! calendar keeps its events. [`PlainCalendar`] is the obvious one, [`Buckets`] the fast one, and the tests hold the
 //! second against the first.
 
+mod buckets;
 mod plain;
-mod tournament;
 
+pub use buckets::Buckets;
 pub use plain::PlainCalendar;
-pub use tournament::Tournament;
 
 use std::cmp::Ordering;
 
@@ -75,5 +75,8 @@ pub trait Calendar: Default {
     fn cancel(&mut self, owner: u32);
 
     /// The first event and its owner; it stays in the calendar.
-    fn next(&self) -> Option<(u32, Event)>;
+    fn next(&mut self) -> Option<(u32, Event)>;
+
+    /// Takes all events out: those to come may lie earlier than those that have been.
+    fn clear(&mut self);
 }

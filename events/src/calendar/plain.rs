@@ -34,8 +34,12 @@ impl Calendar for PlainCalendar {
         self.queue.remove(&owner);
     }
 
-    fn next(&self) -> Option<(u32, Event)> {
+    fn next(&mut self) -> Option<(u32, Event)> {
         let (&owner, &Reverse((time, kind, _, _, partner))) = self.queue.peek()?;
         Some((owner, Event { time: time.into_inner(), kind, partner }))
+    }
+
+    fn clear(&mut self) {
+        self.queue.clear();
     }
 }

@@ -1,6 +1,7 @@
 //! Sphere and sphere: Arbelaez, Zohdi & Dornfeld (2009), eq. (36) to (39).
 
 use nalgebra::Vector3;
+use wide::f64x2;
 
 use super::grazing::{self, GRAZING};
 use super::wide::{Wide, WideVector};
@@ -93,6 +94,26 @@ pub fn spheres_may_touch(a: &Flight, b: &Flight, shift: Vector3<f64>, until: f64
     let on_course = v2 * separation <= approach * approach * (1.0 + FAR_CAUTION) + CAUTION * s * s * v2;
     // Where squares of speeds underflow nothing is known.
     in_time & on_course | (v2 < SMALLEST_SPEED_SQUARED)
+}
+
+/// [`spheres_may_touch`] for one sphere and two others at once: bit k tells of the k-th.
+#[inline]
+#[must_use]
+pub fn spheres_may_touch_two(a: &Flight, others: [&Flight; 2], until: f64) -> u32 {
+    let two = |of: fn(&Flight) -> f64| f64x2::from(others.map(of));
+    let dot = |a: [f64x2; 3], b: [f64x2; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let velocity = [two(|b| b.velocity.x), two(|b| b.velocity.y), two(|b| b.velocity.z)];
+    let position = [two(|b| b.position.x), two(|b| b.position.y), two(|b| b.position.z)];
+    let later = a.time - two(|b| b.time);
+    let v: [f64x2; 3] = std::array::from_fn(|axis| velocity[axis] - a.velocity[axis]);
+    let r: [f64x2; 3] = std::array::from_fn(|axis| position[axis] + velocity[axis] * later - a.position[axis]);
+    let s = two(|b| b.radius) + a.radius;
+    let (approach, v2, s2) = (-dot(r, v), dot(v, v), s * s);
+    let separation = dot(r, r) - s2;
+    let in_time = separation.simd_le(approach * (2.0 * (until - a.time)) + (separation.abs() + s2) * CAUTION);
+    let on_course = (v2 * separation).simd_le(approach * approach * (1.0 + FAR_CAUTION) + s2 * v2 * CAUTION);
+    let unknown = v2.simd_lt(f64x2::splat(SMALLEST_SPEED_SQUARED));
+    (in_time & on_course | unknown).to_bitmask()
 }
 
 /// What rounding may do to a bound, relative: much more than it does (as far as 1e9 radii from the origin), and too little to let many pairs pass.

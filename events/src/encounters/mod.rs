@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use crate::calendar::{Calendar, Event, Kind, Tournament};
+use crate::calendar::{Buckets, Calendar, Event, Kind};
 use crate::lists::Lists;
-use crate::neighbors::Cells;
+use crate::neighbors::{Cells, Near};
 use crate::{Bend, Domain, Flight, NoSurface, Outlook, Surface};
 
 mod plan;
@@ -47,9 +47,21 @@ enum Neighbors {
     /// Nobody: grains pass through each other.
     Nobody,
     /// For long flights.
-    Cells(Cells),
+    Cells(Box<Cells>),
     /// For short sub-steps.
     Lists(Lists),
+}
+
+impl Neighbors {
+    /// Adds every grain that can soon touch `grain`, and perhaps itself, to `near`.
+    #[inline]
+    fn add(&self, grain: u32, near: &mut Near) {
+        match self {
+            Self::Nobody => {}
+            Self::Cells(cells) => cells.add_around(grain, near),
+            Self::Lists(lists) => near.beyond.extend_from_slice(lists.of(grain)),
+        }
+    }
 }
 
 /// Grains in free flight, and the order in which they meet each other and the surface.
@@ -75,7 +87,7 @@ enum Neighbors {
 /// assert_eq!(balls.flight(1).position_at(4.0).x, 5.0);
 /// ```
 #[derive(Clone, Debug)]
-pub struct Encounters<S: Surface = NoSurface, C: Calendar = Tournament> {
+pub struct Encounters<S: Surface = NoSurface, C: Calendar = Buckets> {
     flights: Vec<Flight>,
     plans: Vec<Plan>,
     neighbors: Neighbors,
@@ -96,6 +108,8 @@ pub struct Encounters<S: Surface = NoSurface, C: Calendar = Tournament> {
     crossings: usize,
     /// Neighbours looked at since then.
     looks: usize,
+    /// The neighbours that were visited last, kept for its memory.
+    near: Near,
 }
 
 impl<S: Surface, C: Calendar> Encounters<S, C> {
@@ -137,6 +151,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             sag: 0.0,
             crossings: 0,
             looks: 0,
+            near: Near::default(),
         }
     }
 
@@ -284,9 +299,9 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         };
         match &self.neighbors {
             Neighbors::Cells(cells) if cells.fits(radius) => {
-                let mut free = true;
-                cells.visit_near(position, time, |other, _| free &= keeps_clear(other));
-                free
+                let mut near = Near::default();
+                cells.add_near(position, time, &mut near);
+                near.iter().all(|(other, _)| keeps_clear(other))
             }
             _ => self.inside().all(keeps_clear),
         }
@@ -299,16 +314,6 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     pub fn start_epoch(&mut self, duration: f64, next: f64) {
         self.halt(duration);
         self.resume(next);
-    }
-
-    /// Calls `visit` with every grain that can soon touch `grain`, and the shift (m) of its image.
-    #[inline]
-    fn visit(&self, grain: u32, mut visit: impl FnMut(u32, Vector3<f64>)) {
-        match &self.neighbors {
-            Neighbors::Nobody => {}
-            Neighbors::Cells(cells) => cells.visit_around(grain, visit),
-            Neighbors::Lists(lists) => lists.of(grain).iter().for_each(|&(other, shift)| visit(other, shift)),
-        }
     }
 
     /// Advances all grains to a common moment, which is time 0 from then on.
@@ -358,7 +363,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         for grain in self.inside() {
             cells.insert(grain, self.flight(grain), now);
         }
-        self.neighbors = Neighbors::Cells(cells);
+        self.neighbors = Neighbors::Cells(Box::new(cells));
         (self.crossings, self.looks) = (0, 0);
     }
 
@@ -387,6 +392,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     }
 
     fn predict_all(&mut self) {
+        self.calendar.clear();
         for grain in 0..self.flights.len() {
             self.plans[grain].pair = never(Kind::Review);
         }
@@ -406,7 +412,9 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
                 Neighbors::Nobody => self.domain.wrap(&mut flight.position),
                 Neighbors::Cells(cells) => {
                     self.domain.wrap(&mut flight.position);
-                    cells.wrapped(grain, flight.position - before);
+                    if flight.position != before {
+                        cells.wrapped(grain, flight.position - before);
+                    }
                 }
                 // The shifts in the lists are those of the positions with which they were made.
                 Neighbors::Lists(_) => {}
@@ -467,10 +475,12 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     /// Finds the first grain that this one meets, among all that are near.
     #[inline]
     fn find_partner(&mut self, grain: u32) {
-        let mut search = self.search(grain);
-        self.visit(grain, |other, shift| search.consider(other, shift));
-        let (best, looks) = (search.best, search.looks);
-        self.looks += looks;
+        let mut near = std::mem::take(&mut self.near);
+        near.clear();
+        self.neighbors.add(grain, &mut near);
+        self.looks += near.len();
+        let best = self.search(grain).first_among(&mut near);
+        self.near = near;
         self.plan_pair(grain, best);
     }
 
@@ -487,7 +497,6 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             flights: &self.flights,
             plans: &self.plans,
             best: plan.pair,
-            looks: 0,
         }
     }
 
@@ -525,11 +534,13 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         let mut best = self.plans[grain as usize].pair;
         if let Neighbors::Cells(cells) = &mut self.neighbors {
             let step = cells.cross(grain, &self.flights[grain as usize], axis);
-            let mut search = self.search(grain);
-            if let Neighbors::Cells(cells) = &self.neighbors {
-                cells.visit_ahead(grain, axis, step, |other, shift| search.consider(other, shift));
+            let mut near = std::mem::take(&mut self.near);
+            near.clear();
+            cells.add_ahead(grain, axis, step, &mut near);
+            if near.len() > 0 {
+                best = self.search(grain).first_among(&mut near);
             }
-            best = search.best;
+            self.near = near;
         }
         self.plans[grain as usize].crossing = self.crossing(grain);
         self.look_at_surface(grain);

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::{Encounters, Neighbors, is_vacant};
 use crate::calendar::Calendar;
 use crate::lists::{Lists, skin};
-use crate::neighbors::Cells;
+use crate::neighbors::{Cells, Near};
 use crate::{Bend, Flight, Surface};
 
 /// Two grains that touch or nearly do.
@@ -27,11 +27,6 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         let acceleration = self.accelerations.get(grain as usize).copied().unwrap_or_else(Vector3::zeros);
         let step = if self.horizon < f64::INFINITY { self.horizon } else { 0.0 };
         Bend { acceleration, step }
-    }
-
-    /// Adds to the acceleration (m/s²) of a grain that has just met something, as if it had been so since the sub-step began: the chord stays.
-    pub fn pull(&mut self, grain: u32, more: Vector3<f64>) {
-        self.accelerations[grain as usize] += more;
     }
 
     /// Changes the acceleration (m/s²) of a grain that has just met something and is yet to be deflected: place and velocity stay, the chord
@@ -56,14 +51,16 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     pub fn touching(&self, grain: u32, time: f64, reach: f64, mut visit: impl FnMut(u32, Vector3<f64>)) {
         let ours = self.flight(grain);
         let place = ours.position_at(time);
-        self.visit(grain, |other, shift| {
+        let mut near = Near::default();
+        self.neighbors.add(grain, &mut near);
+        for (other, shift) in near.iter().filter(|&(other, _)| other != grain) {
             let theirs = self.flight(other);
             let apart = theirs.position_at(time) + shift - place;
             let within = ours.radius + theirs.radius + reach;
             if apart.norm_squared() < within * within {
                 visit(other, apart);
             }
-        });
+        }
     }
 
     /// Brings a grain to `time` (s, epoch time), before it is deflected without having met anything itself.
@@ -92,17 +89,19 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
 
     /// All pairs of grains, standing at time 0, that are nearer to each other than `reach` (m), in the order of their numbers.
     fn touches(&self, reach: f64) -> Vec<Touch> {
-        let mut touches = Vec::new();
+        let (mut touches, mut near) = (Vec::new(), Near::default());
         for a in self.inside() {
             let ours = self.flights[a as usize];
-            self.visit(a, |b, shift| {
+            near.clear();
+            self.neighbors.add(a, &mut near);
+            for (b, shift) in near.iter() {
                 let theirs = self.flights[b as usize];
                 let apart = theirs.position + shift - ours.position;
                 let within = ours.radius + theirs.radius + reach;
                 if a < b && apart.norm_squared() < within * within {
                     touches.push(Touch { a, b, apart });
                 }
-            });
+            }
         }
         touches.sort_unstable_by_key(|touch| (touch.a, touch.b));
         touches

@@ -16,7 +16,7 @@ use crate::law::{NearField, Term};
 /// m_n = (beta)_n / n!; for beta < 1, m_n = 2 ((beta + 1)/2)_n / n!. An expansion of order P takes what is of degree n < P. What it leaves of the force of
 /// sources of strengths s_j at distances r_j ≤ b from the centre of their cell, on a grain at most a from that of its own, is at most
 /// Σ_(n ≥ P) m_n R^(−beta − n) Σ_j |s_j| (a + r_j)^n: a binomial sum of the mean powers of r_j ([`Cell::spreads`]) for n = P, and for each further
-/// n at most q (a + b) / R times that, with q = m_(P+1) / m_P.
+/// n at most q (a + b) / R times that, with q = m_(P+1) / m_P. Both terms of the law count with their shares of the force at R.
 ///
 /// **The budget.** Per unit of strength of the sources, the error may be half the tolerance times the sum of what they contribute
 /// themselves, at least, and of what all grains of the set contribute on average to the forces in the cell of the grain
@@ -32,30 +32,54 @@ pub(super) struct Acceptance {
     half_tolerance: f64,
     /// Share of their radii that cells are taken to fill.
     filling: f64,
-    /// The larger beta, rounded up.
-    steepest: i32,
-    /// m_n, the larger of both terms.
-    growth: [f64; MAX_ORDER + 1],
-    /// m_(n+1) / m_n, the larger of both terms.
-    growth_ratios: [f64; MAX_ORDER + 1],
+    /// How both terms of the law grow near their sources.
+    terms: [Growth; 2],
     /// C(n, k).
     binomials: [[f64; MAX_ORDER + 1]; MAX_ORDER + 1],
     /// The orders that are tried, at most.
     highest: usize,
 }
 
+/// How the Taylor terms of a force r^-beta grow towards its source.
+#[derive(Clone, Debug)]
+struct Growth {
+    /// beta, rounded up.
+    steepness: i32,
+    /// m_n.
+    largest: [f64; MAX_ORDER + 1],
+    /// m_(n+1) / m_n.
+    ratios: [f64; MAX_ORDER + 1],
+}
+
+impl Growth {
+    fn of(term: Term) -> Self {
+        let orders = std::array::from_fn(|n| n);
+        Self {
+            steepness: term.beta.ceil() as i32,
+            largest: orders.map(|n| growth(term.beta, n)),
+            ratios: orders.map(|n| growth_ratio(term.beta, n)),
+        }
+    }
+}
+
+/// How far apart two cells are, and what the law is there.
+#[derive(Clone, Copy)]
+struct Distance {
+    /// m
+    r: f64,
+    /// Sum of the magnitudes of both terms, N.
+    magnitude: f64,
+    /// The share of each.
+    shares: [f64; 2],
+}
+
 impl Acceptance {
     pub(super) fn new(law: &NearField, tolerance: f64, filling: f64, highest: usize) -> Self {
-        let terms = [law.attraction(), law.repulsion()].into_iter().filter(|term| term.alpha != 0.0);
-        let betas: Vec<f64> = terms.map(|term: Term| term.beta).collect();
-        let largest = |of: fn(f64, usize) -> f64, n: usize| betas.iter().map(|&beta| of(beta, n)).fold(0.0, f64::max);
-        let orders = std::array::from_fn(|n| n);
+        let orders: [usize; MAX_ORDER + 1] = std::array::from_fn(|n| n);
         Self {
             half_tolerance: 0.5 * tolerance,
             filling,
-            steepest: betas.iter().copied().fold(0.0, f64::max).ceil() as i32,
-            growth: orders.map(|n| largest(growth, n)),
-            growth_ratios: orders.map(|n| largest(growth_ratio, n)),
+            terms: [law.attraction(), law.repulsion()].map(Growth::of),
             binomials: orders.map(|n| orders.map(|k| binomial(n, k))),
             highest,
         }
@@ -68,19 +92,26 @@ impl Acceptance {
         if reach >= r {
             return None;
         }
-        let magnitude = law.magnitude(r);
-        let limits = [self.limit(r, magnitude, one, other), self.limit(r, magnitude, other, one)];
+        let magnitudes = law.magnitudes(r);
+        let magnitude = magnitudes[0] + magnitudes[1];
+        let distance = Distance { r, magnitude, shares: magnitudes.map(|one| one / magnitude) };
+        let limits = [self.limit(distance, one, other), self.limit(distance, other, one)];
         let good = |order: usize| {
-            self.error(order, r, one, other) <= limits[0] && self.error(order, r, other, one) <= limits[1]
+            self.error(order, distance, one, other) <= limits[0] && self.error(order, distance, other, one) <= limits[1]
         };
         good(self.highest).then(|| (1..self.highest).find(|&order| good(order)).unwrap_or(self.highest))
     }
 
     /// Bound of the error per unit of strength of the sources, over the force at the distance `r` of the centres (m).
-    fn error(&self, order: usize, r: f64, target: &Cell, source: &Cell) -> f64 {
-        let convergence = 1.0 - self.growth_ratios[order] * (target.radius + source.radius) / r;
-        if convergence <= 0.0 {
-            return f64::INFINITY;
+    fn error(&self, order: usize, Distance { r, shares, .. }: Distance, target: &Cell, source: &Cell) -> f64 {
+        let reach = (target.radius + source.radius) / r;
+        let mut growth = 0.0;
+        for (share, term) in shares.into_iter().zip(&self.terms) {
+            let convergence = 1.0 - term.ratios[order] * reach;
+            if share > 0.0 && convergence <= 0.0 {
+                return f64::INFINITY;
+            }
+            growth += if share > 0.0 { share * term.largest[order] / convergence } else { 0.0 };
         }
         let (near, inverse) = (target.radius / r, 1.0 / r);
         // Horner's rule in the radius of the target, with the spreads of the sources in units of r.
@@ -90,14 +121,16 @@ impl Acceptance {
             sum = sum * near + self.binomials[order][k] * source.spreads[k] * unit;
             unit *= inverse;
         }
-        self.growth[order] * sum / convergence * self.filling.powi(order as i32)
+        growth * sum * self.filling.powi(order as i32)
     }
 
     /// What the error may be, in the same units.
-    fn limit(&self, r: f64, magnitude: f64, target: &Cell, source: &Cell) -> f64 {
+    fn limit(&self, Distance { r, magnitude, shares }: Distance, target: &Cell, source: &Cell) -> f64 {
         // Forces are convex in the distance: their mean is at least that at the mean distance.
         let nearest = 1.0 / (1.0 + (target.radius + source.spreads[1]) / r);
-        self.half_tolerance * (nearest.powi(self.steepest) + target.mean_contribution / magnitude)
+        let own = |(share, term): (f64, &Growth)| share * nearest.powi(term.steepness);
+        let own: f64 = shares.into_iter().zip(&self.terms).map(own).sum();
+        self.half_tolerance * (own + target.mean_contribution / magnitude)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use impinge_events::calendar::{Calendar, Tournament};
+use impinge_events::calendar::{Buckets, Calendar};
 use impinge_events::{Domain, Encounter, Encounters, Flight, Surface};
 use nalgebra::Vector3;
 
@@ -63,7 +63,7 @@ pub struct Laws {
 
 /// Grains, what they meet, and the laws of their meetings; advanced from event to event.
 #[derive(Clone, Debug)]
-pub struct EventDriven<S: Surface, C: Calendar = Tournament> {
+pub struct EventDriven<S: Surface, C: Calendar = Buckets> {
     encounters: Encounters<S, C>,
     /// What grains carry besides their flights, by the numbers of `encounters`.
     grains: Vec<Grain>,
@@ -302,8 +302,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     fn collide(&mut self, time: f64, a: u32, b: u32, observer: &mut impl Observer) -> Result<(), Broken> {
         // The lower id is the first of the two: slots are used again, ids are not.
         let (a, b) = if self.grains[a as usize].id < self.grains[b as usize].id { (a, b) } else { (b, a) };
-        self.synchronise(a, b);
-        let (first, second) = (self.body(a), self.body(b));
+        let (mut first, mut second) = (self.body(a), self.body(b));
         let (flight_a, flight_b) = (self.true_flight(a), self.true_flight(b));
         // The chords touch, and the normal is theirs: whoever resolves a contact sees the approach that the prediction saw.
         let chords = self.encounters.flight(b).position - self.encounters.flight(a).position;
@@ -320,13 +319,17 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             self.deflect(&[(other, onwards)]);
             return Ok(());
         }
-        let slow =
-            self.force.acts && (first.velocity - second.velocity).dot(&normal) <= self.force.resting_speed_of_pairs;
+        let elastic = normal * (2.0 * (first.velocity - second.velocity).dot(&normal) / (first.mass + second.mass));
+        let late = self.synchronisation(time, [a, b], [-elastic * second.mass, elastic * first.mass]);
+        let approach = (first.velocity - second.velocity + late[0] - late[1]).dot(&normal);
+        let slow = self.force.acts && approach <= self.force.resting_speed_of_pairs;
         if slow && self.carries() {
             self.check(time, &ids, overlap_over_radius, &[])?;
             self.hand_on(time, [a, b], normal);
             return Ok(());
         }
+        first.velocity += late[0];
+        second.velocity += late[1];
         let external = self.external([a, b]);
         let mut contact = resolve_pair_under(&self.laws.grain, &first, &second, normal, &external);
         let mut withheld = 0.0;
@@ -339,7 +342,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         }
         // Where rounding has turned the slightest graze into none, both fly on.
         if contact.impulse.normal == 0.0 {
-            self.deflect(&[(a, first.velocity), (b, second.velocity)]);
+            self.deflect(&[(a, first.velocity - late[0]), (b, second.velocity - late[1])]);
             return Ok(());
         }
         let [mut after_a, mut after_b] = contact.after;
@@ -353,7 +356,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.check(time, &ids, overlap_over_radius, &[after_a.velocity, after_b.velocity])?;
         self.grains[a as usize].spin = after_a.spin;
         self.grains[b as usize].spin = after_b.spin;
-        self.deflect(&[(a, after_a.velocity), (b, after_b.velocity)]);
+        self.deflect(&[(a, after_a.velocity - late[0]), (b, after_b.velocity - late[1])]);
         self.collisions += 1;
         observer.grain_collision(&GrainCollision {
             time: self.epoch_start + time,
@@ -387,6 +390,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         if slow && self.carries() {
             return self.hold_on_surface(time, grain, &before, &contact);
         }
+        let elastic = contact.normal * (2.0 * (before.velocity - contact.velocity).dot(&contact.normal));
+        let [late] = self.synchronisation(time, [grain], [-elastic]);
+        let before = Body { velocity: before.velocity + late, ..before };
         let external = self.external([grain, grain]).on_first;
         let mut resolved =
             resolve_surface_under(&self.laws.surface, &before, contact.normal, contact.velocity, external);
@@ -402,7 +408,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             self.force.held.dissipated_surface += change - resolved.impulse.dissipated;
         }
         if resolved.impulse.normal == 0.0 {
-            self.deflect(&[(grain, before.velocity)]);
+            self.deflect(&[(grain, before.velocity - late)]);
             return Ok(());
         }
         let overlap_over_radius = -contact.gap / before.radius;
@@ -414,7 +420,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         if matches!(self.laws.interference, Interference::FirstOrder | Interference::RemovedOnFirstCollision) {
             self.encounters.pass_through_surface(grain);
         }
-        self.deflect(&[(grain, resolved.after.velocity)]);
+        self.deflect(&[(grain, resolved.after.velocity - late)]);
         self.collisions += 1;
         let arriving = before.velocity - contact.velocity;
         let energy_normal = 0.5 * before.mass * arriving.dot(&contact.normal).powi(2);
@@ -469,7 +475,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let flight = self.true_flight(grain);
         self.pass(grain, 1.0);
         observer.passage(passage, self.epoch_start + time, &flight, &self.grains[grain as usize]);
-        self.force.supported.remove(&grain);
+        self.release(grain);
         self.encounters.remove(grain);
     }
 
@@ -486,6 +492,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             }
         } else {
             self.grains[slot] = grain;
+            if let Some(anchor) = self.force.anchors.get_mut(slot) {
+                *anchor = None;
+            }
             if let Some(row) = self.rows.get_mut(slot) {
                 *row = NO_ROW;
             }

@@ -111,8 +111,11 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
                 if approach > 0.0 && approach <= resting {
                     quiet &= approach <= KEPT * resting;
                     let change = normal * approach;
-                    self.force.held.impulse_surface += change * member.mass;
-                    self.force.held.dissipated_surface -= member.mass * change.dot(&(velocity + change * 0.5));
+                    let work = member.mass * approach * speed;
+                    let held = &mut self.force.held;
+                    held.impulse_surface += change * member.mass;
+                    held.work_surface += work;
+                    held.dissipated_surface += work - member.mass * change.dot(&(velocity + change * 0.5));
                     member.now += change;
                 }
             }

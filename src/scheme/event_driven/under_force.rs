@@ -1,9 +1,10 @@
 //! What the engine does where forces act: sub-steps, synchronised kicks, contacts at rest within a sub-step.
 
+use std::collections::BTreeMap;
+
 use impinge_events::calendar::Calendar;
-use impinge_events::{Flight, Surface, SurfaceContact, Touch};
+use impinge_events::{Bend, Flight, Surface, SurfaceContact, Touch};
 use nalgebra::Vector3;
-use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::EventDriven;
 use super::pressed::Pressed;
@@ -42,6 +43,8 @@ pub(in crate::scheme) struct Under {
     pub(in crate::scheme) gravity: Vector3<f64>,
     /// The near field, as it acts between two grains that touch.
     pub(in crate::scheme) near_field: Option<NearField>,
+    /// Whether it is summed over all pairs, one by one.
+    pub(in crate::scheme) all_pairs: bool,
     /// How long a contact lasts for the impulse that forces give to it, s.
     pub(in crate::scheme) contact_time: f64,
 }
@@ -59,6 +62,10 @@ pub struct Held {
     pub dissipated_grain: f64,
     /// The same at contacts with the surface.
     pub dissipated_surface: f64,
+    /// Work of a moving surface on grains, J; where it carries them, until the middle of the sub-step, as the impulse.
+    pub work_surface: f64,
+    /// Power of a moving surface on the grains that it carries since they came to rest on it in this sub-step, W.
+    pub power_surface: f64,
 }
 
 /// A grain that the surface carries until the end of the sub-step, or until it leaves.
@@ -66,8 +73,12 @@ pub struct Held {
 pub(super) struct Support {
     /// What the surface adds to the acceleration, m/s².
     acceleration: Vector3<f64>,
+    /// Where the grain was when that changed last, m.
+    place: Vector3<f64>,
     /// Normals of the contacts, and how fast (m/s) the surface moves along each.
     contacts: Vec<(Vector3<f64>, f64)>,
+    /// Power of the surface, W; 0 where it does not move.
+    power: f64,
 }
 
 /// What the engine keeps of forces.
@@ -81,14 +92,12 @@ pub(super) struct UnderForce {
     pub(super) resting_speed: f64,
     /// The same for two grains, and for grains among others at the surface.
     pub(super) resting_speed_of_pairs: f64,
-    /// Where the grains were at the last kick, m; empty without a near field.
-    anchors: Vec<Vector3<f64>>,
+    /// Where the grains were at the last kick, m; empty without a near field, and nowhere for a grain that has come since.
+    pub(super) anchors: Vec<Option<Vector3<f64>>>,
     /// Which grains touched others at the last kick.
     touching: Vec<bool>,
-    /// Pairs whose accelerations are those of their contact already.
-    synchronised: FxHashSet<[u32; 2]>,
     /// Grains that the surface carries since they came to rest on it in this sub-step.
-    pub(super) supported: FxHashMap<u32, Support>,
+    pub(super) supported: BTreeMap<u32, Support>,
     /// What contacts at rest did since it was last asked.
     pub(super) held: Held,
     /// Who pushes whom; kept for its memory.
@@ -127,11 +136,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             (self.force.resting_speed, self.force.resting_speed_of_pairs) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
         }
         self.force.anchors.clear();
-        self.force.synchronised.clear();
-        self.force.supported.clear();
         if under.near_field.is_some() {
             let slots = 0..self.grains.len() as u32;
-            self.force.anchors.extend(slots.map(|grain| self.encounters.flight(grain).position));
+            self.force.anchors.extend(slots.map(|grain| Some(self.encounters.flight(grain).position)));
         }
         self.begin(after, length);
     }
@@ -141,15 +148,28 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.force.at_rest = at_rest;
     }
 
-    /// What contacts at rest did since it was last taken.
+    /// What contacts at rest did until simulated time `time` (s), to which the run has been advanced, since it was last taken.
     #[must_use]
-    pub fn held(&self) -> Held {
-        self.force.held
+    pub fn held(&self, time: f64) -> Held {
+        let given = |(&grain, support): (&u32, &Support)| self.given(grain, support, time - self.epoch_start);
+        let dissipated_surface =
+            self.force.held.dissipated_surface - self.force.supported.iter().map(given).sum::<f64>();
+        Held { dissipated_surface, ..self.force.held }
     }
 
-    /// What contacts at rest did since this was last asked.
-    pub fn take_held(&mut self) -> Held {
-        std::mem::take(&mut self.force.held)
+    /// What contacts at rest did in the sub-step that has ended.
+    pub(in crate::scheme) fn take_held(&mut self) -> Held {
+        let held = self.held(self.time);
+        self.force.supported.clear();
+        self.force.held = Held::default();
+        held
+    }
+
+    /// Energy (J) that the surface gave to a grain that it carries until `time` (s).
+    fn given(&self, grain: u32, support: &Support, time: f64) -> f64 {
+        let flight = self.encounters.flight(grain).advanced_to(time);
+        let place = flight.position + self.encounters.bend(grain).offset(time);
+        support.acceleration.dot(&(place - support.place)) * self.grains[grain as usize].mass
     }
 
     /// Mass of all grains (kg), their momentum beyond that of their chords at simulated time `time` (N s), and how far that is behind the middle
@@ -188,23 +208,62 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         External::new(grains.map(force), self.force.under.contact_time)
     }
 
-    /// Gives two grains that touch the accelerations they have there: the near field between the two at contact, in place of that at the last
-    /// kick. The rest of the near field hardly changes within a sub-step.
-    #[inline]
-    pub(super) fn synchronise(&mut self, a: u32, b: u32) {
-        let Some(near_field) = self.force.under.near_field else { return };
-        let slots = self.force.anchors.len() as u32;
-        if a < slots && b < slots && self.force.synchronised.insert([a, b]) {
-            let [at_kick_a, at_kick_b] = [a, b].map(|grain| self.force.anchors[grain as usize]);
-            let now = self.true_flight(b).position - self.true_flight(a).position;
-            let strength = self.grains[a as usize].strength * self.grains[b as usize].strength;
-            let force = (near_field.force_on(self.domain.nearest(now))
-                - near_field.force_on(self.domain.nearest(at_kick_b - at_kick_a)))
-                * strength;
-            for (grain, force) in [(a, force), (b, -force)] {
-                self.encounters.pull(grain, force / self.grains[grain as usize].mass);
+    /// What grains that touch at `time` (s) lack of the velocity (m/s) that they have there: they collide with it, and go on without it. `turns` is by
+    /// how much a collision without loss would change the velocity of each (m/s).
+    ///
+    /// First, the near field has changed since the kick. With v_c = v_half + a (tau - h/2), a that of contact, the map of a sub-step is its own
+    /// reverse, and errors of many collisions do not add up to a drift.
+    ///
+    /// Second, what leapfrog keeps is not the energy but, for unit masses, E + h²/12 v·Kv - h²/24 a², with K the second derivatives of the potential
+    /// (Hairer, Lubich & Wanner 2006, section IX.8). Seen from v_c this is ½ v_c² - w v_c·Kv_c and what a collision leaves alone, where
+    /// w = ½ tau (h - tau) - h²/12 is 0 on average: left to itself it makes a random walk of the energy. Grains that collide with
+    /// v_c - w K (v_c + v_c') instead keep it, as v·Kv changes by (v_c' - v_c)·K (v_c' + v_c). Momentum is kept in any case.
+    ///
+    /// Where the near field is not summed pair by pair, what is not of the two that collide stays as it was at the kick, and the energy drifts at
+    /// second order.
+    pub(super) fn synchronisation<const N: usize>(
+        &self,
+        time: f64,
+        grains: [u32; N],
+        turns: [Vector3<f64>; N],
+    ) -> [Vector3<f64>; N] {
+        let mut lacks = [Vector3::zeros(); N];
+        let Some(near_field) = self.force.under.near_field else { return lacks };
+        for ((lack, turn), grain) in lacks.iter_mut().zip(turns).zip(grains) {
+            let Some(anchor) = self.anchor(grain) else { continue };
+            let flight = *self.encounters.flight(grain);
+            let (mut change, mut rate) = (Vector3::zeros(), Vector3::zeros());
+            let mut add = |other: u32| {
+                let Some(other_anchor) = self.anchor(other).filter(|_| other != grain) else { return };
+                let theirs = self.encounters.flight(other);
+                let apart = self.domain.nearest(theirs.position_at(time) - flight.position_at(time));
+                let at_kick = self.domain.nearest(other_anchor - anchor);
+                let strength = self.grains[other as usize].strength;
+                let velocity = (theirs.velocity - flight.velocity) * 2.0 - turn;
+                let [force, force_rate] = near_field.force_and_rate_on(apart, velocity);
+                change += (force - near_field.force_on(at_kick)) * strength;
+                // What the two that collide do to each other is the same before and after.
+                if !grains.contains(&other) {
+                    rate += force_rate * strength;
+                }
+            };
+            if self.force.under.all_pairs {
+                self.encounters.inside().for_each(add);
+            } else {
+                grains.into_iter().for_each(&mut add);
             }
+            let Grain { mass, strength, .. } = self.grains[grain as usize];
+            let Bend { step, .. } = self.encounters.bend(grain);
+            let weight = 0.5 * time * (step - time) - step * step / 12.0;
+            *lack = (change * (time - 0.5 * step) + rate * weight) * (strength / mass);
         }
+        lacks
+    }
+
+    /// Where a grain was at the last kick (m), if the near field acts on it since.
+    #[inline]
+    fn anchor(&self, grain: u32) -> Option<Vector3<f64>> {
+        self.force.anchors.get(grain as usize).copied().flatten()
     }
 
     /// Approach speed (m/s) below which a grain has come to rest against the surface.
@@ -232,12 +291,20 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let pull = (acceleration.dot(&contact.normal) - RELIEF * acceleration.amax()).min(0.0);
         self.encounters.accelerate(grain, acceleration - contact.normal * pull);
         self.redirect(&[(grain, after)]);
-        let support = self.force.supported.entry(grain).or_default();
+        let mut support = self.release(grain);
+        let speed = contact.velocity.dot(&contact.normal);
         support.acceleration -= contact.normal * pull;
-        support.contacts.push((contact.normal, contact.velocity.dot(&contact.normal)));
-        self.force.held.impulse_surface += (self.encounters.flight(grain).velocity - chord) * before.mass;
-        self.force.held.dissipated_surface +=
-            0.5 * before.mass * (before.velocity.norm_squared() - after.norm_squared());
+        support.place = self.true_flight(grain).position;
+        support.contacts.push((contact.normal, speed));
+        support.power -= pull * speed * before.mass;
+        let held = &mut self.force.held;
+        held.impulse_surface += (self.encounters.flight(grain).velocity - chord) * before.mass;
+        held.power_surface += support.power;
+        let work =
+            (after - before.velocity).dot(&contact.velocity) * before.mass - support.power * (time - 0.5 * self.epoch);
+        held.work_surface += work;
+        held.dissipated_surface += 0.5 * before.mass * (before.velocity.norm_squared() - after.norm_squared()) + work;
+        self.force.supported.insert(grain, support);
         Ok(())
     }
 
@@ -247,13 +314,26 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let resting = self.force.resting_speed_of_pairs;
         let leaves = |(normal, speed): &(Vector3<f64>, f64)| velocity.dot(normal) - speed > resting;
         if self.force.supported.get(&grain).is_some_and(|support| support.contacts.iter().any(leaves)) {
-            let support = self.force.supported.remove(&grain).unwrap_or_default();
+            let support = self.release(grain);
             let chord = self.encounters.flight(grain).velocity;
             let acceleration = self.encounters.bend(grain).acceleration;
             self.encounters.accelerate(grain, acceleration - support.acceleration);
             let mass = self.grains[grain as usize].mass;
             self.force.held.impulse_surface += (self.encounters.flight(grain).velocity - chord) * mass;
         }
+    }
+
+    /// Books what the surface did to a grain that has just met something, if it has carried it, and tells how.
+    pub(super) fn release(&mut self, grain: u32) -> Support {
+        let Some(support) = self.force.supported.remove(&grain) else { return Support::default() };
+        let time = self.encounters.flight(grain).time;
+        let work = support.power * (time - 0.5 * self.epoch);
+        let given = self.given(grain, &support, time);
+        let held = &mut self.force.held;
+        held.work_surface += work;
+        held.power_surface -= support.power;
+        held.dissipated_surface += work - given;
+        support
     }
 
     /// The flight of a grain as it is at its local time: without forces the stored one.

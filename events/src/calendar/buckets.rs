@@ -1,0 +1,373 @@
+//! The fast calendar: buckets of time, after Paul, J. Comput. Phys. 221 (2007) 615.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use super::{Calendar, Event, Kind};
+
+const NOBODY: u32 = u32::MAX;
+const NO_EVENT: Event = Event { time: f64::INFINITY, kind: Kind::Exit, partner: u32::MAX };
+/// Buckets for each event: as many as hold most of the waiting times when about one event is in each.
+const BUCKETS_PER_EVENT: usize = 2;
+/// The buckets are laid out anew when fewer events than this part of their number, or more than so many times their number, have come in a turn.
+const FEWEST_EVENTS: f64 = 0.25;
+const MOST_EVENTS: usize = 4;
+
+/// A calendar in which an owner is rescheduled in a time that does not grow with the number of owners.
+///
+/// Events that come later than the present bucket of time wait in lists without an order, one for each of the next buckets (a turn of them)
+/// and one for what comes after the turn. When a bucket becomes the present one its events go into a heap, and so do those that are
+/// scheduled into it from then on. About one event is in a bucket, so the heap is all but empty. Should thousands come at once, it is a heap still.
+#[derive(Clone, Debug)]
+pub struct Buckets {
+    /// The event of each owner.
+    events: Vec<Event>,
+    /// Owners before and after each in the list where it waits.
+    links: Vec<Link>,
+    /// First owner in each of the lists: those of a turn, and last the one for later turns.
+    first: Vec<u32>,
+    /// Events of the present bucket and all before it, and some that are no longer so.
+    present: BinaryHeap<Entry>,
+    /// The present bucket, counted from `origin`.
+    now: u64,
+    /// The bucket with which the turn began: a multiple of their number.
+    turn: u64,
+    /// Start of bucket 0, s.
+    origin: f64,
+    /// Buckets in a second, 1/s; 0 where they are not laid out.
+    rate: f64,
+    /// Owners that wait in the lists of this turn.
+    waiting: usize,
+    /// Events that have come into the heap in this turn.
+    passed: usize,
+    /// The same since the buckets were laid out, until this turn.
+    passed_before: usize,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Link {
+    before: u32,
+    after: u32,
+}
+
+/// An event of `owner` in the heap.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    event: Event,
+    owner: u32,
+}
+
+impl Ord for Entry {
+    /// The earliest is the greatest: what a heap gives first.
+    #[inline]
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.event.order(other.owner, &self.event, self.owner)
+    }
+}
+
+impl PartialOrd for Entry {
+    #[inline]
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Entry {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Entry {}
+
+impl Default for Buckets {
+    fn default() -> Self {
+        Self {
+            events: Vec::new(),
+            links: Vec::new(),
+            first: vec![NOBODY; 2],
+            present: BinaryHeap::new(),
+            now: 0,
+            turn: 0,
+            origin: 0.0,
+            rate: 0.0,
+            waiting: 0,
+            passed: 0,
+            passed_before: 0,
+        }
+    }
+}
+
+impl Buckets {
+    /// How many buckets are in a turn: a power of two.
+    #[inline]
+    fn buckets(&self) -> u64 {
+        self.first.len() as u64 - 1
+    }
+
+    /// The bucket of a time.
+    #[inline]
+    fn bucket(&self, time: f64) -> u64 {
+        // Saturates: times before the origin are in bucket 0.
+        ((time - self.origin) * self.rate) as u64
+    }
+
+    /// The list of a bucket later than the present one.
+    #[inline]
+    fn list(&self, bucket: u64) -> usize {
+        let buckets = self.buckets();
+        (if bucket - self.turn < buckets { bucket & (buckets - 1) } else { buckets }) as usize
+    }
+
+    /// Puts the event of `owner` where it belongs.
+    #[inline]
+    fn enter(&mut self, owner: u32) {
+        if self.rate == 0.0 {
+            return;
+        }
+        let event = self.events[owner as usize];
+        let bucket = self.bucket(event.time);
+        if bucket <= self.now {
+            self.passed += 1;
+            return self.present.push(Entry { event, owner });
+        }
+        let list = self.list(bucket);
+        let after = std::mem::replace(&mut self.first[list], owner);
+        self.links[owner as usize] = Link { before: NOBODY, after };
+        if after != NOBODY {
+            self.links[after as usize].before = owner;
+        }
+        self.waiting += usize::from(list + 1 < self.first.len());
+    }
+
+    /// Takes the event of `owner` from where it is; the heap forgets it later.
+    #[inline]
+    fn leave(&mut self, owner: u32) {
+        let time = self.events[owner as usize].time;
+        if time == f64::INFINITY {
+            return;
+        }
+        let bucket = self.bucket(time);
+        if bucket <= self.now {
+            return;
+        }
+        let Link { before, after } = self.links[owner as usize];
+        let list = self.list(bucket);
+        if before == NOBODY {
+            self.first[list] = after;
+        } else {
+            self.links[before as usize].after = after;
+        }
+        if after != NOBODY {
+            self.links[after as usize].before = before;
+        }
+        self.waiting -= usize::from(list + 1 < self.first.len());
+    }
+
+    /// Goes on to the next bucket that holds an event; tells whether there is one.
+    fn go_on(&mut self) -> bool {
+        let later = self.first.len() - 1;
+        while self.present.is_empty() {
+            if self.waiting == 0 {
+                if self.first[later] == NOBODY {
+                    return false;
+                }
+                self.start_turn();
+                continue;
+            }
+            self.now += 1;
+            let list = self.list(self.now);
+            let mut owner = std::mem::replace(&mut self.first[list], NOBODY);
+            while owner != NOBODY {
+                self.waiting -= 1;
+                self.passed += 1;
+                self.present.push(Entry { event: self.events[owner as usize], owner });
+                owner = self.links[owner as usize].after;
+            }
+        }
+        true
+    }
+
+    /// Starts the turn in which the next event is. Nobody waits but for later turns.
+    #[cold]
+    fn start_turn(&mut self) {
+        self.passed_before += self.passed;
+        let few = (self.passed as f64) < FEWEST_EVENTS * self.buckets() as f64;
+        // To lay out costs as much as that many events, however few there are in a turn.
+        if few && self.passed_before as u64 > self.buckets() {
+            return self.lay_out();
+        }
+        let mut next = u64::MAX;
+        let later = self.first.len() - 1;
+        let mut owner = self.first[later];
+        while owner != NOBODY {
+            next = next.min(self.bucket(self.events[owner as usize].time));
+            owner = self.links[owner as usize].after;
+        }
+        self.turn = next & !(self.buckets() - 1);
+        // The bucket before the next one: everybody is later.
+        self.now = next.saturating_sub(1);
+        self.passed = 0;
+        owner = std::mem::replace(&mut self.first[later], NOBODY);
+        while owner != NOBODY {
+            let after = self.links[owner as usize].after;
+            self.enter(owner);
+            owner = after;
+        }
+    }
+
+    /// Chooses the number and the width of the buckets by the events that there are.
+    #[cold]
+    fn lay_out(&mut self) {
+        let mut times: Vec<f64> =
+            self.events.iter().map(|event| event.time).filter(|&time| time < f64::INFINITY).collect();
+        if times.is_empty() {
+            return;
+        }
+        let count = times.len();
+        let (earlier, &mut median, _) = times.select_nth_unstable_by(count / 2, f64::total_cmp);
+        self.origin = earlier.iter().copied().fold(median, f64::min);
+        // Half of the events come until the median.
+        self.rate = (0.5 * count as f64 / (median - self.origin)).min(f64::MAX);
+        self.first.clear();
+        self.first.resize((BUCKETS_PER_EVENT * count).next_power_of_two() + 1, NOBODY);
+        self.present.clear();
+        (self.now, self.turn, self.waiting, self.passed, self.passed_before) = (0, 0, 0, 0, 0);
+        for owner in 0..self.events.len() as u32 {
+            if self.events[owner as usize].time < f64::INFINITY {
+                self.enter(owner);
+            }
+        }
+    }
+}
+
+impl Calendar for Buckets {
+    fn reserve(&mut self, owners: usize) {
+        if owners > self.events.len() {
+            self.events.resize(owners, NO_EVENT);
+            self.links.resize(owners, Link { before: NOBODY, after: NOBODY });
+        }
+    }
+
+    #[inline]
+    fn schedule(&mut self, owner: u32, event: Event) {
+        if owner as usize >= self.events.len() {
+            self.reserve(owner as usize + 1);
+        }
+        if self.events[owner as usize] == event {
+            return;
+        }
+        self.leave(owner);
+        self.events[owner as usize] = event;
+        if event.time < f64::INFINITY {
+            self.enter(owner);
+        }
+    }
+
+    fn cancel(&mut self, owner: u32) {
+        if (owner as usize) < self.events.len() {
+            self.leave(owner);
+            self.events[owner as usize] = NO_EVENT;
+        }
+    }
+
+    #[inline]
+    fn next(&mut self) -> Option<(u32, Event)> {
+        if self.rate == 0.0 || self.passed > MOST_EVENTS * self.first.len() {
+            self.lay_out();
+        }
+        loop {
+            while let Some(&Entry { event, owner }) = self.present.peek() {
+                if self.events[owner as usize] == event {
+                    return Some((owner, event));
+                }
+                self.present.pop();
+            }
+            if !self.go_on() {
+                return None;
+            }
+        }
+    }
+
+    fn clear(&mut self) {
+        self.events.fill(NO_EVENT);
+        self.present.clear();
+        (self.now, self.rate) = (0, 0.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt as _, SeedableRng as _};
+
+    use super::*;
+    use crate::calendar::PlainCalendar;
+
+    /// Random schedules and cancellations with many equal times: both calendars give the same events in the same order.
+    #[test]
+    fn buckets_equal_the_plain_calendar() {
+        let mut random = rand_pcg::Pcg64::seed_from_u64(7);
+        let (mut fast, mut plain) = (Buckets::default(), PlainCalendar::default());
+        for step in 0..200_000 {
+            let owner = random.random_range(0..1 + step / 500);
+            if random.random_range(0..4) == 0 {
+                fast.cancel(owner);
+                plain.cancel(owner);
+            } else {
+                let kind =
+                    [Kind::Crossing, Kind::Review, Kind::Grains, Kind::Surface, Kind::Exit][random.random_range(0..5)];
+                let time = f64::from(random.random_range(-20..20)) / 8.0;
+                let event = Event { time, kind, partner: random.random_range(0..9) };
+                fast.schedule(owner, event);
+                plain.schedule(owner, event);
+            }
+            let ends = (fast.next(), plain.next());
+            let same = match ends {
+                // A pair may stand in the calendar under both of its grains: then either may come first.
+                (Some((a, x)), Some((b, y))) => x.order(a, &y, b) == Ordering::Equal,
+                (a, b) => a.is_none() && b.is_none(),
+            };
+            assert!(same, "step {step}: {ends:?}");
+            if let Some((owner, _)) = ends.0.filter(|_| step % 3 == 0) {
+                fast.cancel(owner);
+                plain.cancel(owner);
+            }
+        }
+    }
+
+    /// The hold model with waits over many orders of magnitude, a crowd at one moment, and new starts: whatever the width of the buckets is by then.
+    #[test]
+    fn buckets_equal_the_plain_calendar_at_any_pace() {
+        let mut random = rand_pcg::Pcg64::seed_from_u64(8);
+        let (mut fast, mut plain) = (Buckets::default(), PlainCalendar::default());
+        let owners = 300;
+        for start in 0..40 {
+            fast.clear();
+            plain.clear();
+            let pace = 10_f64.powi(start % 20 - 10);
+            let schedule = |fast: &mut Buckets, plain: &mut PlainCalendar, owner, time| {
+                let event = Event { time, kind: Kind::Grains, partner: owner };
+                fast.schedule(owner, event);
+                plain.schedule(owner, event);
+            };
+            let mut wait = |scatter: i32| pace * 10_f64.powf(random.random_range(-1.0..1.0) * f64::from(scatter));
+            (0..owners).for_each(|owner| schedule(&mut fast, &mut plain, owner, wait(start % 7)));
+            for step in 0..4000 {
+                let (ours, theirs) = (fast.next(), plain.next());
+                assert_eq!(ours, theirs, "start {start}, step {step}");
+                let Some((owner, event)) = ours else { break };
+                // Now and then everybody waits for the same moment.
+                let pause = if step / 500 % 4 == 3 { pace } else { wait(start % 7) };
+                let time = if step / 500 % 4 == 3 { (event.time / pace).ceil() * pace } else { event.time };
+                schedule(&mut fast, &mut plain, owner, time + pause);
+            }
+        }
+    }
+
+    #[test]
+    fn an_event_that_never_comes_is_none() {
+        let mut calendar = Buckets::default();
+        calendar.schedule(3, Event { time: f64::INFINITY, kind: Kind::Grains, partner: 1 });
+        assert_eq!(calendar.next(), None);
+    }
+}

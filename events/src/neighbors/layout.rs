@@ -1,0 +1,171 @@
+//! Size, motion and growth of the cells, chosen so that grains cross few of them.
+
+use nalgebra::Vector3;
+
+use super::slots::slots;
+use crate::{Domain, Flight};
+
+/// A cell is wider than the largest contact distance by this fraction, so that a crossing that is late by rounding cannot
+/// hide a contact; the position of a grain is known to about 1e-16 of its distance from the origin.
+const CELL_MARGIN: f64 = 1e-6;
+/// Fewest cells along an axis of a periodic domain. With four, two grains in adjacent cells have one nearest image.
+pub(super) const FEWEST_PERIODIC_CELLS: i32 = 4;
+/// No grain stands so many cells from the corner when the grid is laid out: the numbers of cells (below 2^31) then last for an epoch.
+const FARTHEST_CELL: f64 = (1u32 << 29) as f64;
+
+/// Steps between the numbers of cells that are adjacent along x, y and z where there is no period. Odd fractions of 2^32 without a pattern
+/// (2^32 over the golden ratio, and over its square root) scatter the rows over the slots; along x cells stay side by side in memory.
+const SCATTERED: [u32; 3] = [1, 0x9E37_79B1, 0xC949_57E9];
+
+/// Width of the smallest cells that grains up to this radius (m) may have, m.
+pub(super) fn contact_width(largest_radius: f64) -> f64 {
+    2.0 * largest_radius * (1.0 + CELL_MARGIN)
+}
+
+/// Size and motion of the grid.
+#[derive(Clone, Debug)]
+pub(super) struct Layout {
+    /// Size of a cell, m.
+    pub(super) size: Vector3<f64>,
+    /// Cells in a period along each axis; 0 where there is none.
+    pub(super) period: Vector3<i32>,
+    /// Length of the period along each axis, m; 0 where there is none.
+    pub(super) extent: Vector3<f64>,
+    /// Steps between the numbers of cells that are adjacent along x, y and z.
+    strides: [u32; 3],
+    /// Corner of cell (0, 0, 0) at epoch time 0, m.
+    pub(super) corner: Vector3<f64>,
+    /// Velocity of that corner, m/s.
+    pub(super) drift: Vector3<f64>,
+    /// By which part of its size at `born` a cell grows in a second, 1/s; never negative.
+    pub(super) growth: Vector3<f64>,
+    /// When the cells were laid out, s (epoch time).
+    pub(super) born: f64,
+}
+
+impl Layout {
+    /// Cells of about `width` (m), and at least of the size of a contact, for `flights` as they are at `now` (s, epoch time).
+    ///
+    /// The grid drifts with the median velocity: that makes the fewest crossings.
+    pub(super) fn new(domain: &Domain, largest_radius: f64, width: Option<f64>, flights: &[Flight], now: f64) -> Self {
+        let contact = contact_width(largest_radius);
+        let axes = domain.axes();
+        let (mut corner, mut extent) = (Vector3::zeros(), Vector3::repeat(contact));
+        let (mut drift, mut growth) = (Vector3::zeros(), Vector3::zeros());
+        for &axis in axes {
+            if domain.periodic {
+                (corner[axis], extent[axis]) = (domain.min[axis], domain.max[axis] - domain.min[axis]);
+            } else if !flights.is_empty() {
+                let mut places: Vec<f64> = flights.iter().map(|flight| flight.position_at(now)[axis]).collect();
+                // A few grains that fly ahead do not count.
+                let [low, high] = [quantile(&mut places, 0.05), quantile(&mut places, 0.95)];
+                let flow = Flow::along(axis, flights, now);
+                (drift[axis], growth[axis]) = (flow.velocity_at(low), flow.growth);
+                corner[axis] = low - drift[axis] * now;
+                extent[axis] = contact.max((high - low) / 0.9);
+            }
+        }
+        let volume: f64 = axes.iter().map(|&axis| extent[axis]).product();
+        let one_in_each_slot = (volume / slots(flights.len()) as f64).powf(1.0 / axes.len() as f64);
+        let reach = |flight: &Flight| (flight.position_at(now) - corner - drift * now).amax();
+        let farthest = flights.iter().map(reach).fold(0.0, f64::max);
+        let width = contact.max(width.unwrap_or(one_in_each_slot)).max(farthest / FARTHEST_CELL);
+        // In a period each cell has a slot of its own.
+        let width = if domain.periodic { width.max(one_in_each_slot) } else { width };
+        let (mut size, mut period) = (Vector3::repeat(width), Vector3::zeros());
+        if domain.periodic {
+            for &axis in axes {
+                period[axis] = ((extent[axis] / width).floor() as i32).max(FEWEST_PERIODIC_CELLS);
+                size[axis] = extent[axis] / f64::from(period[axis]);
+            }
+        }
+        let extent = if domain.periodic {
+            period.zip_map(&domain.extent(), |n, length| if n > 0 { length } else { 0.0 })
+        } else {
+            Vector3::zeros()
+        };
+        let strides = if domain.periodic {
+            let [x, y] = [period.x as u32, period.y.max(1) as u32];
+            [1, x, x * y]
+        } else {
+            SCATTERED
+        };
+        Self { size, period, extent, strides, corner, drift, growth, born: now }
+    }
+
+    /// What `cells` along `axis` add to the number of a cell.
+    #[inline]
+    pub(super) fn along(&self, axis: usize, cells: i32) -> u32 {
+        (cells as u32).wrapping_mul(self.strides[axis])
+    }
+
+    /// How large cells are at `time` (s, epoch time), in units of their size.
+    #[inline]
+    pub(super) fn scale(&self, time: f64) -> Vector3<f64> {
+        (self.growth * (time - self.born)).add_scalar(1.0)
+    }
+
+    /// Velocity of side `number` of the cells along `axis`, m/s.
+    #[inline]
+    pub(super) fn side_velocity(&self, axis: usize, number: i32) -> f64 {
+        self.drift[axis] + f64::from(number) * self.size[axis] * self.growth[axis]
+    }
+
+    /// How many cells `flights` cross in a second, as they are at `now` (s, epoch time).
+    pub(super) fn crossing_rate(&self, flights: &[Flight], now: f64) -> f64 {
+        let scale = self.scale(now);
+        let rate = |flight: &Flight| {
+            let place = flight.position_at(now) - (self.corner + self.drift * now);
+            let flow = self.drift + place.component_div(&scale).component_mul(&self.growth);
+            (flight.velocity - flow).component_div(&self.size).component_div(&scale).lp_norm(1)
+        };
+        flights.iter().map(rate).sum()
+    }
+}
+
+/// How a stream moves along one axis: its velocity rises with the place, as that of a spray that flies apart does.
+struct Flow {
+    /// Velocity at the origin, m/s.
+    velocity: f64,
+    /// Rise of the velocity, 1/s; never negative.
+    growth: f64,
+}
+
+impl Flow {
+    /// The flow along `axis` that `flights` follow as they are at `now` (s, epoch time).
+    ///
+    /// The rise is that of the line of least squares if that leaves less to be crossed than none; the velocity is the median of what is
+    /// left, which makes the fewest crossings.
+    fn along(axis: usize, flights: &[Flight], now: f64) -> Self {
+        let count = flights.len() as f64;
+        let state = |flight: &Flight| (flight.position_at(now)[axis], flight.velocity[axis]);
+        let sums = flights.iter().map(state).fold((0.0, 0.0), |(x, v), state| (x + state.0, v + state.1));
+        let (mean_x, mean_v) = (sums.0 / count, sums.1 / count);
+        let (mut spread, mut rise) = (0.0, 0.0);
+        for (x, v) in flights.iter().map(state) {
+            spread += (x - mean_x) * (x - mean_x);
+            rise += (x - mean_x) * (v - mean_v);
+        }
+        let with = |growth: f64| {
+            let mut rests: Vec<f64> = flights.iter().map(state).map(|(x, v)| v - growth * x).collect();
+            let velocity = quantile(&mut rests, 0.5);
+            (Self { velocity, growth }, rests.iter().map(|rest| (rest - velocity).abs()).sum::<f64>())
+        };
+        let (still, to_cross) = with(0.0);
+        if rise.is_nan() || rise <= 0.0 {
+            return still;
+        }
+        let (flow, less) = with(rise / spread);
+        if less < to_cross { flow } else { still }
+    }
+
+    fn velocity_at(&self, place: f64) -> f64 {
+        self.velocity + self.growth * place
+    }
+}
+
+/// The value below which a fraction `part` of `values` lies.
+fn quantile(values: &mut [f64], part: f64) -> f64 {
+    let rank = ((values.len() - 1) as f64 * part) as usize;
+    *values.select_nth_unstable_by(rank, f64::total_cmp).1
+}

@@ -1,0 +1,372 @@
+//! Who can meet whom before when: cells that drift with the stream.
+//!
+//! A grain can only touch grains in its own cell and the cells around it until it leaves its cell. The grid of cells moves at
+//! a constant velocity, so grains that fly side by side at that velocity never cross a cell. The grid has no bounds: cells
+//! are hashed into slots, so memory follows the grains and not the domain; grains of another cell that share a slot are
+//! passed over. In a periodic domain a whole number of cells tiles the period.
+//!
+//! Cells are bookkeeping: neither their size nor their drift can change a bit of a prediction.
+
+mod layout;
+mod slots;
+
+use nalgebra::Vector3;
+
+use self::layout::{FEWEST_PERIODIC_CELLS, Layout, contact_width};
+use self::slots::Slots;
+use crate::{Domain, Flight};
+
+/// A crossing costs about as much as so many looks at a neighbour (instruction counts of the jet of 8000 grains).
+const LOOKS_PER_CROSSING: f64 = 10.0;
+/// A new layout costs a look around for every grain: it is taken when it cuts the cost to this fraction.
+const WORTH_A_NEW_LAYOUT: f64 = 0.9;
+const NOBODY: u32 = u32::MAX;
+
+/// Smallest side (m) that a periodic domain may have for grains of this radius (m): eight radii and a little, or the image that a
+/// grain meets would not be clear.
+#[must_use]
+pub fn least_period(radius: f64) -> f64 {
+    f64::from(FEWEST_PERIODIC_CELLS) * contact_width(radius)
+}
+
+/// A grain in the list of those that share its slot.
+#[derive(Clone, Copy, Debug)]
+struct Link {
+    /// The number of its cell, before it is taken modulo the number of slots: hardly ever that of another cell.
+    number: u32,
+    /// The next one.
+    next: u32,
+    /// How many periods its cell lies beyond the period along each axis, in 21 bits each.
+    turns: u64,
+}
+
+/// Grains that are near another one.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Near {
+    /// Those that are where their stored positions say.
+    pub(crate) here: Vec<u32>,
+    /// Those whose periodic images are near, and the shift (m) that brings them there. Others may be among them, with a shift of zero.
+    pub(crate) beyond: Vec<(u32, Vector3<f64>)>,
+}
+
+impl Near {
+    pub(crate) fn clear(&mut self) {
+        self.here.clear();
+        self.beyond.clear();
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.here.len() + self.beyond.len()
+    }
+
+    /// All of them, with their shifts.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (u32, Vector3<f64>)> + '_ {
+        self.here.iter().map(|&other| (other, Vector3::zeros())).chain(self.beyond.iter().copied())
+    }
+}
+
+/// Where a grain stands in the grid.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    /// Cell along each axis, as the stored position of the grain sees it: in a periodic domain it may lie beyond the period.
+    cell: Vector3<i32>,
+    /// At which ends of the period it lies: as the number of that of the 27 cells around a cell to which one would step there.
+    edges: u32,
+}
+
+/// At no end of the period.
+const INSIDE: u32 = 13;
+const THREE_TO: [u32; 3] = [1, 3, 9];
+const NOWHERE: Place = Place { cell: Vector3::new(0, 0, 0), edges: INSIDE };
+
+/// A crossing: when, and into which cell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Crossing {
+    pub(crate) time: f64,
+    /// 0, 1 or 2.
+    pub(crate) axis: u8,
+}
+
+/// The bits of the nine cells that lie ahead of a step along each axis, down and up.
+const AHEAD: [[u32; 2]; 3] = {
+    let mut ahead = [[0; 2]; 3];
+    let mut number = 0;
+    while number < 27 {
+        let mut axis = 0;
+        while axis < 3 {
+            let step = steps(number)[axis];
+            if step != 0 {
+                ahead[axis][(step > 0) as usize] |= 1 << number;
+            }
+            axis += 1;
+        }
+        number += 1;
+    }
+    ahead
+};
+
+/// The steps along each axis that lead to one of the 27 cells around a cell and itself.
+const fn steps(number: usize) -> [i32; 3] {
+    let number = number as i32;
+    [number % 3 - 1, number / 3 % 3 - 1, number / 9 - 1]
+}
+
+/// The grid.
+#[derive(Clone, Debug)]
+pub(crate) struct Cells {
+    layout: Layout,
+    domain: Domain,
+    /// The bits of the 27 cells around a cell that can hold grains which touch one in it.
+    around: u32,
+    slots: Slots,
+    links: Vec<Link>,
+    places: Vec<Place>,
+    /// What the cells around a cell add to its number, for each kind of edge.
+    offsets: Box<[[u32; 27]; 27]>,
+}
+
+impl Cells {
+    /// An empty grid for grains of radius `largest_radius` at most, laid out for `flights` as they are at `now` (s, epoch time).
+    pub(crate) fn new(domain: Domain, largest_radius: f64, flights: &[Flight], now: f64) -> Self {
+        let layout = Layout::new(&domain, largest_radius, None, flights, now);
+        Self::empty(domain, layout, flights.len())
+    }
+
+    /// The same with cells that are wider than a contact by `skin` (m).
+    pub(crate) fn with_skin(
+        domain: Domain,
+        largest_radius: f64,
+        skin: f64,
+        flights: &[Flight],
+        now: f64,
+    ) -> Option<Self> {
+        let radius = largest_radius + 0.5 * skin;
+        domain.holds(radius).then(|| Self::new(domain, radius, flights, now))
+    }
+
+    fn empty(domain: Domain, layout: Layout, grains: usize) -> Self {
+        let offsets = Box::new(std::array::from_fn(|edges| Self::offsets(&layout, edges)));
+        // In a planar scene nobody is beside the plane.
+        let beside = if domain.planar { AHEAD[1][0] | AHEAD[1][1] } else { 0 };
+        let around = ((1 << 27) - 1) & !beside;
+        Self { layout, domain, around, slots: Slots::new(grains), links: Vec::new(), places: Vec::new(), offsets }
+    }
+
+    /// An empty grid that suits `flights` better, if it is worth its cost; `crossings` and `looks` are what this one took lately.
+    ///
+    /// Cells x times as wide are crossed 1/x times as often and hold x³ times as many grains to look at. The sum of both costs is
+    /// least where x⁴ = cost of the crossings / (3 cost of the looks); in a planar scene x³ with 2.
+    pub(crate) fn better(
+        &self,
+        largest_radius: f64,
+        flights: &[Flight],
+        now: f64,
+        crossings: usize,
+        looks: usize,
+    ) -> Option<Self> {
+        let dimensions = self.domain.axes().len() as f64;
+        let (crossing, looking) = (LOOKS_PER_CROSSING * crossings as f64, looks.max(1) as f64);
+        let wider = (crossing / (dimensions * looking)).powf(1.0 / (dimensions + 1.0)).clamp(0.5, 2.0);
+        let width = self.layout.size.x * wider;
+        let layout = Layout::new(&self.domain, largest_radius, Some(width), flights, now);
+        let fewer = layout.crossing_rate(flights, now) / self.layout.crossing_rate(flights, now);
+        let more = (layout.size.x / self.layout.size.x).powf(dimensions);
+        let worth_it = fewer * crossing + more * looking < WORTH_A_NEW_LAYOUT * (crossing + looking);
+        worth_it.then(|| Self::empty(self.domain, layout, flights.len()))
+    }
+
+    /// Whether grains of this radius fit the cells.
+    pub(crate) fn fits(&self, radius: f64) -> bool {
+        self.domain.axes().iter().all(|&axis| contact_width(radius) <= self.layout.size[axis])
+    }
+
+    /// Whether so many grains would crowd the slots.
+    pub(crate) fn crowded(&self, grains: usize) -> bool {
+        grains > self.slots.len()
+    }
+
+    /// Position relative to the corner of the grid, in the frame that drifts with it.
+    fn relative(&self, position: Vector3<f64>, time: f64) -> Vector3<f64> {
+        position - (self.layout.corner + self.layout.drift * time)
+    }
+
+    fn cell_of(&self, position: Vector3<f64>, time: f64) -> Vector3<i32> {
+        let size = self.layout.size.component_mul(&self.layout.scale(time));
+        let mut cell = self.relative(position, time).component_div(&size).map(|x| x.floor() as i32);
+        if self.domain.planar {
+            cell.y = 0;
+        }
+        cell
+    }
+
+    /// What each of the 27 cells around a cell and itself adds to its number, where periods end at the sides that `edges` tells.
+    fn offsets(layout: &Layout, edges: usize) -> [u32; 27] {
+        let offset = |number: usize, axis: usize| {
+            let (step, edge) = (steps(number)[axis], steps(edges)[axis]);
+            layout.along(axis, if edge == step { step - layout.period[axis] * step } else { step })
+        };
+        std::array::from_fn(|number| (0..3).fold(0, |sum: u32, axis| sum.wrapping_add(offset(number, axis))))
+    }
+
+    /// The place of a cell, its number and its turns.
+    #[inline]
+    fn place(&self, cell: Vector3<i32>) -> (Place, u32, u64) {
+        let (mut number, mut edges, mut turns) = (0_u32, INSIDE, 0);
+        for axis in 0..3 {
+            let period = self.layout.period[axis];
+            let mut home = cell[axis];
+            if period > 0 {
+                if home as u32 >= period as u32 {
+                    home = home.rem_euclid(period);
+                    turns |= (((cell[axis] - home) / period) as u64 & 0x1F_FFFF) << (21 * axis);
+                }
+                edges += THREE_TO[axis] * u32::from(home + 1 == period);
+                edges -= THREE_TO[axis] * u32::from(home == 0);
+            }
+            number = number.wrapping_add(self.layout.along(axis, home));
+        }
+        (Place { cell, edges }, number, turns)
+    }
+
+    /// Puts grain `id` into the cell where it is at `now` (s, epoch time).
+    pub(crate) fn insert(&mut self, id: u32, flight: &Flight, now: f64) {
+        if self.links.len() <= id as usize {
+            self.links.resize(id as usize + 1, Link { number: 0, next: NOBODY, turns: 0 });
+            self.places.resize(id as usize + 1, NOWHERE);
+        }
+        self.link(id, self.cell_of(flight.position_at(now), now));
+    }
+
+    #[inline]
+    fn link(&mut self, id: u32, cell: Vector3<i32>) {
+        let (place, number, turns) = self.place(cell);
+        self.places[id as usize] = place;
+        self.links[id as usize] = Link { number, next: self.slots.replace_first(number, id), turns };
+    }
+
+    /// Takes grain `id` out.
+    #[inline]
+    pub(crate) fn remove(&mut self, id: u32) {
+        let Link { number, next, .. } = self.links[id as usize];
+        // Few grains share a slot.
+        let mut other = self.slots.first(number);
+        if other == id {
+            self.slots.replace_first(number, next);
+            return;
+        }
+        while self.links[other as usize].next != id {
+            other = self.links[other as usize].next;
+        }
+        self.links[other as usize].next = next;
+    }
+
+    /// Tells the grid that a periodic wrap has moved the stored position of `id` by `shift`.
+    pub(crate) fn wrapped(&mut self, id: u32, shift: Vector3<f64>) {
+        let turns = shift.component_div(&self.domain.extent()).map(|x| x.round() as i32);
+        let (place, _, turns) = self.place(self.places[id as usize].cell + turns.component_mul(&self.layout.period));
+        self.places[id as usize] = place;
+        self.links[id as usize].turns = turns;
+    }
+
+    /// When and through which side `flight` leaves its cell.
+    #[inline]
+    pub(crate) fn crossing(&self, id: u32, flight: &Flight) -> Crossing {
+        let cell = self.places[id as usize].cell;
+        let y = self.relative(flight.position, flight.time);
+        let size = self.layout.size.component_mul(&self.layout.scale(flight.time));
+        let mut first = Crossing { time: f64::INFINITY, axis: 0 };
+        for axis in 0..3 {
+            let Some((step, speed)) = self.way_out(cell, flight, axis) else { continue };
+            let side = f64::from(cell[axis] + i32::from(step > 0)) * size[axis];
+            let time = flight.time + (side - y[axis]) / speed;
+            if time < first.time {
+                first = Crossing { time, axis: axis as u8 };
+            }
+        }
+        first
+    }
+
+    /// Through which side along `axis` (1 or -1) a flight leaves its cell, and how fast (m/s) it approaches that side; `None` where it never
+    /// does.
+    #[inline]
+    fn way_out(&self, cell: Vector3<i32>, flight: &Flight, axis: usize) -> Option<(i32, f64)> {
+        let v = flight.velocity[axis];
+        let to_upper = v - self.layout.side_velocity(axis, cell[axis] + 1);
+        if to_upper > 0.0 {
+            return Some((1, to_upper));
+        }
+        let to_lower = v - self.layout.side_velocity(axis, cell[axis]);
+        (to_lower < 0.0).then_some((-1, to_lower))
+    }
+
+    /// Moves grain `id` into the next cell along `axis` and tells which way it went.
+    #[inline]
+    pub(crate) fn cross(&mut self, id: u32, flight: &Flight, axis: u8) -> i32 {
+        let axis = usize::from(axis);
+        let step = self.way_out(self.places[id as usize].cell, flight, axis).map_or(1, |(step, _)| step);
+        self.remove(id);
+        let mut cell = self.places[id as usize].cell;
+        cell[axis] += step;
+        self.link(id, cell);
+        step
+    }
+
+    /// Adds to `near` every grain in the cells that have become adjacent to grain `id` by its last `step` along `axis`.
+    #[inline]
+    pub(crate) fn add_ahead(&self, id: u32, axis: u8, step: i32, near: &mut Near) {
+        let ahead = AHEAD[usize::from(axis)][usize::from(step > 0)];
+        self.add(self.places[id as usize], self.links[id as usize], ahead & self.around, near);
+    }
+
+    /// Adds to `near` every grain in the cells around grain `id`, itself included.
+    #[inline]
+    pub(crate) fn add_around(&self, id: u32, near: &mut Near) {
+        self.add(self.places[id as usize], self.links[id as usize], self.around, near);
+    }
+
+    /// Adds to `near` every grain in the cells around `position`, where there need not be a grain.
+    pub(crate) fn add_near(&self, position: Vector3<f64>, time: f64, near: &mut Near) {
+        let (place, number, turns) = self.place(self.cell_of(position, time));
+        self.add(place, Link { number, next: NOBODY, turns }, self.around, near);
+    }
+
+    /// Adds to `near` every grain in those of the 27 cells around a place whose bits are set.
+    fn add(&self, place: Place, link: Link, wanted: u32, near: &mut Near) {
+        let offsets = &self.offsets[place.edges as usize];
+        let mut occupied = 0;
+        for row in 0..9 {
+            let number = link.number.wrapping_add(offsets[3 * row + 1]);
+            occupied |= u32::from(self.slots.occupied(number)) << (3 * row);
+        }
+        if place.edges % 3 != INSIDE % 3 {
+            // Rows go on at the other end of the period.
+            occupied = u32::MAX;
+        }
+        occupied &= wanted;
+        while occupied != 0 {
+            let around = occupied.trailing_zeros() as usize;
+            occupied &= occupied - 1;
+            let number = link.number.wrapping_add(offsets[around]);
+            let mut other = self.slots.first(number);
+            while other != NOBODY {
+                let theirs = self.links[other as usize];
+                if theirs.number == number {
+                    if place.edges == INSIDE && theirs.turns == link.turns {
+                        near.here.push(other);
+                    } else {
+                        near.beyond.push((other, self.shift(other, place.cell, around)));
+                    }
+                }
+                other = theirs.next;
+            }
+        }
+    }
+
+    /// The shift (m) that brings `grain` to where its image is in the cell with this number around `centre`.
+    #[inline(never)]
+    fn shift(&self, grain: u32, centre: Vector3<i32>, around: usize) -> Vector3<f64> {
+        let Layout { period, extent, .. } = &self.layout;
+        let apart = centre + Vector3::from(steps(around)) - self.places[grain as usize].cell;
+        Vector3::from_fn(|axis, _| f64::from(apart[axis] / period[axis].max(1)) * extent[axis])
+    }
+}

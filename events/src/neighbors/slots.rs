@@ -1,0 +1,64 @@
+//! The table of cells: hashed, so that memory follows the grains and not the domain.
+
+/// Slots for each grain, at least: more cost memory, fewer are shared by cells.
+const SLOTS_PER_GRAIN: usize = 4;
+/// Fewest slots.
+const FEWEST: usize = 64;
+
+/// How many slots so many grains get.
+pub(super) fn slots(grains: usize) -> usize {
+    (SLOTS_PER_GRAIN * grains).max(FEWEST).next_power_of_two()
+}
+
+/// The first grain in each slot, if there is one.
+#[derive(Clone, Debug)]
+pub(super) struct Slots {
+    first: Vec<u32>,
+    /// Whether there is a grain in the slot before each slot (bit 0), in it, and in the slot after it (bit 2): so an empty cell costs next to
+    /// nothing.
+    occupied: Vec<u8>,
+}
+
+impl Slots {
+    /// Empty slots for so many grains.
+    pub(super) fn new(grains: usize) -> Self {
+        let slots = slots(grains);
+        Self { first: vec![u32::MAX; slots], occupied: vec![0; slots] }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.first.len()
+    }
+
+    /// The slot of the cell with this number.
+    #[inline]
+    fn slot(&self, number: u32) -> usize {
+        number as usize & (self.first.len() - 1)
+    }
+
+    /// The first grain in the slot of a cell, or the largest number where there is none.
+    #[inline]
+    pub(super) fn first(&self, number: u32) -> u32 {
+        self.first[self.slot(number)]
+    }
+
+    /// Makes `grain`, or nobody (the largest number), the first in the slot of a cell; gives the one that was.
+    #[inline]
+    pub(super) fn replace_first(&mut self, number: u32, grain: u32) -> u32 {
+        let slot = self.slot(number);
+        let before = std::mem::replace(&mut self.first[slot], grain);
+        if (before == u32::MAX) != (grain == u32::MAX) {
+            for (step, bit) in [(1, 0), (0, 1), (u32::MAX, 2)] {
+                let beside = self.slot(number.wrapping_add(step));
+                self.occupied[beside] ^= 1 << bit;
+            }
+        }
+        before
+    }
+
+    /// Whether the slots before (bit 0), of (bit 1) and after (bit 2) that of a cell are occupied.
+    #[inline]
+    pub(super) fn occupied(&self, number: u32) -> u8 {
+        self.occupied[self.slot(number)]
+    }
+}
