@@ -43,7 +43,7 @@ fn plane(point: [f64; 3], normal: [f64; 3]) -> scene::Surface {
 }
 
 /// `count` grains on a loose lattice, shaken, over the floor of a box as wide as the pile will be high.
-fn box_of(count: u32, restitution: f64, mu: f64) -> Substepped<Surface> {
+fn box_of(count: u32, restitution: f64, mu: f64, step: f64) -> Substepped<Surface> {
     let friction = if mu > 0.0 { Friction::Coulomb { static_: mu, dynamic: mu } } else { Friction::Smooth };
     let law = ContactLaw { restitution, friction };
     let laws = Laws { grain: law, surface: law, interference: Interference::All, collapse: Collapse::Elastic };
@@ -69,7 +69,7 @@ fn box_of(count: u32, restitution: f64, mu: f64) -> Substepped<Surface> {
         .collect();
     let engine = EventDriven::new(&grains, surface, Domain::unbounded(), laws, 0.0);
     let forces = Forces { gravity: Vector3::z() * -GRAVITY, near_field: None, contact_time: 0.0 };
-    Substepped::new(engine, forces, laws, Length::Fixed(STEP))
+    Substepped::new(engine, forces, laws, Length::Fixed(step))
 }
 
 fn advance(run: &mut Substepped<Surface>, time: f64, observer: &mut impl Observer) {
@@ -93,9 +93,9 @@ fn motion(run: &Substepped<Surface>, time: f64) -> f64 {
 }
 
 /// A pile comes to rest by `settled` (s) and is at rest until `until` (s): hardly anything collides or moves; nothing sinks in; the books close.
-fn comes_to_rest(count: u32, restitution: f64, mu: f64, settled: f64, until: f64) {
+fn comes_to_rest(count: u32, restitution: f64, mu: f64, step: f64, [settled, until]: [f64; 2]) {
     let what = format!("{count} grains, restitution {restitution}, friction {mu}");
-    let mut run = box_of(count, restitution, mu);
+    let mut run = box_of(count, restitution, mu, step);
     let mut observers = (Count::default(), Ledger::default());
     run.tell(0.0, &mut observers).expect("finite forces");
     run.engine().snapshot(0.0, |snapshot| observers.sample(snapshot));
@@ -128,16 +128,17 @@ fn comes_to_rest(count: u32, restitution: f64, mu: f64, settled: f64, until: f64
 
 #[test]
 fn a_pile_of_300_comes_to_rest() {
-    comes_to_rest(300, 0.3, 0.4, 1.5, 2.0);
+    comes_to_rest(300, 0.3, 0.4, STEP, [1.5, 2.0]);
 }
 
 #[test]
 fn plastic_grains_come_to_rest() {
-    comes_to_rest(100, 0.0, 0.4, 1.0, 1.5);
+    comes_to_rest(100, 0.0, 0.4, STEP, [1.0, 1.5]);
 }
 
 #[test]
-#[ignore = "minutes: cargo test --release --test pile -- --ignored --nocapture"]
+#[ignore = "minutes, and fails: the pile creeps by 4.5e-3 radii in half a second (docs/contacts-at-rest.md)"]
 fn a_pile_of_2000_comes_to_rest() {
-    comes_to_rest(2000, 0.3, 0.4, 2.0, 2.5);
+    // Friction of the deepest grains is several times their weight, and bends their paths by as much more.
+    comes_to_rest(2000, 0.3, 0.4, 0.75 * STEP, [2.0, 2.5]);
 }

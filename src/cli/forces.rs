@@ -8,8 +8,8 @@ use impinge::law::{NearField, Term};
 use impinge::scene::{Scene, Source, Substep, Summation};
 use impinge::source;
 
-use super::digits;
 use super::estimate::Crowd;
+use super::{digits, plain_or_scientific};
 
 /// Part of the kinetic energy of a grain from which on a potential at contact deserves a warning.
 const STRONG: f64 = 1.0;
@@ -36,7 +36,7 @@ pub(super) fn describe(out: &mut String, scene: &Scene, folder: &Path, count: f6
     near_field(out, scene, folder, count)?;
     sub_steps(out, scene)?;
     match scene.contact.time {
-        Some(time) => writeln!(out, "            contacts take {time} s"),
+        Some(time) => writeln!(out, "            contacts take {} s", plain_or_scientific(time)),
         None => Ok(()),
     }
 }
@@ -46,10 +46,14 @@ fn sub_steps(out: &mut String, scene: &Scene) -> fmt::Result {
     match scene.substep() {
         Substep::Fixed(step) => {
             // To so many digits the rounding of a quotient makes no further sub-step.
-            writeln!(out, "sub-step    {step} s, {} of them", digits(duration / step, 12).ceil())
+            writeln!(out, "sub-step    {} s, {} of them", plain_or_scientific(step), digits(duration / step, 12).ceil())
         }
         Substep::Chosen(_) => {
-            writeln!(out, "sub-step    chosen so that its error stays within {} radii", scene.tolerance())?;
+            writeln!(
+                out,
+                "sub-step    chosen so that its error stays within {} radii",
+                plain_or_scientific(scene.tolerance())
+            )?;
             writeln!(out, "            their number is known after the run")
         }
     }
@@ -69,7 +73,7 @@ fn near_field(out: &mut String, scene: &Scene, folder: &Path, count: f64) -> fmt
         (Summation::CutOff, Some(cutoff), Some(switch)) => {
             format!("over pairs closer than {cutoff} m, fading from {} m on", digits(switch, 6))
         }
-        (Summation::Tree, ..) => format!("by a tree, to a relative error of {}", field.accuracy),
+        (Summation::Tree, ..) => format!("by a tree, to a relative error of {}", plain_or_scientific(field.accuracy)),
         _ => "over all pairs".to_owned(),
     };
     writeln!(out, "            summed {summed}")?;
@@ -84,7 +88,7 @@ fn near_field(out: &mut String, scene: &Scene, folder: &Path, count: f64) -> fmt
 fn term((alpha, beta): (f64, f64)) -> String {
     match alpha {
         0.0 => "none".to_owned(),
-        _ => format!("{alpha} r^-{beta} N"),
+        _ => format!("{} r^-{beta} N", plain_or_scientific(alpha)),
     }
 }
 
@@ -121,12 +125,16 @@ impl Pair {
             );
         }
         let potential = self.strength * (law.potential(contact) - potential_apart(law, scene));
-        write!(out, "            source[{number}]: potential at contact {} J", digits(potential, 3))?;
+        write!(
+            out,
+            "            source[{number}]: potential at contact {} J",
+            plain_or_scientific(digits(potential, 3))
+        )?;
         if self.kinetic_energy == 0.0 {
             return writeln!(out, ", grains at rest");
         }
         let ratio = potential / self.kinetic_energy;
-        writeln!(out, ", {} times the kinetic energy of a grain", digits(ratio, 3))?;
+        writeln!(out, ", {} times the kinetic energy of a grain", plain_or_scientific(digits(ratio, 3)))?;
         if ratio > STRONG {
             writeln!(
                 out,

@@ -125,6 +125,11 @@ fn print(text: &str) -> Result<(), Failure> {
     }
 }
 
+/// A number as people write it: of many zeros in scientific form.
+fn plain_or_scientific(number: f64) -> String {
+    if number == 0.0 || (1e-3..1e6).contains(&number.abs()) { number.to_string() } else { format!("{number:e}") }
+}
+
 /// A number rounded to so many digits.
 fn digits(number: f64, count: usize) -> f64 {
     format!("{number:.*e}", count - 1).parse().unwrap_or(number)

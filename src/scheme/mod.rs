@@ -5,7 +5,7 @@ mod resting;
 mod substep;
 mod timetable;
 
-pub use event_driven::{EventDriven, Held, LARGEST_OVERLAP, LARGEST_OVERLAP_WITH_FORCES, Laws};
+pub use event_driven::{AtRest, EventDriven, Held, LARGEST_OVERLAP, LARGEST_OVERLAP_WITH_FORCES, Laws};
 pub use substep::{Forces, Length, STEPS_PER_CHECK, SubSteps, Substepped};
 pub use timetable::Moments;
 

@@ -25,7 +25,7 @@ const SURFACE_REST: f64 = 1e-3;
 /// Part of the gap, or of the overlap, of a contact at rest that is closed in a sub-step, so that rounding and unfinished sweeps do not add up.
 const CLOSING: f64 = 0.1;
 /// Closing takes no more than this part of the largest acceleration,
-const CLOSING_PULL: f64 = 0.01;
+const CLOSING_PULL: f64 = 0.1;
 /// and to end the approach of the kick before no more than this one: the rest is ended at once ([`Resting::settle`]).
 const BRAKING: f64 = 0.1;
 /// Sweeps stop when no contact changes its acceleration by more than would, by the time that `CLOSING` makes up for it, open or close a gap of

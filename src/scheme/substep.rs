@@ -13,7 +13,7 @@ use impinge_events::{Domain, Flight, Surface};
 use nalgebra::Vector3;
 use rustc_hash::FxHashMap;
 
-use super::event_driven::{Held, Under};
+use super::event_driven::{AtRest, Held, Under};
 use super::resting::Resting;
 use super::{Broken, EventDriven, Kick, Laws, Observer, Passage, Progress, Rest};
 use crate::grains::{Grain, NewGrain, kinetic_energy};
@@ -75,14 +75,13 @@ pub struct Substepped<S: Surface, C: Calendar = Buckets> {
     engine: EventDriven<S, C>,
     forces: Forces,
     laws: Laws,
+    at_rest: AtRest,
     resting: Resting,
     length: Length,
     /// Length of a sub-step, s.
     step: f64,
     /// Length of the sub-step that has ended, s.
     ended: f64,
-    /// By how much its middle was earlier than planned, s.
-    missing: f64,
     /// End of the current sub-step, simulated time, s.
     step_end: f64,
     /// What acted on each grain at the last kick, m/s², without what contacts carry.
@@ -256,11 +255,11 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             engine,
             forces,
             laws,
+            at_rest: AtRest::default(),
             resting: Resting::default(),
             length,
             step: 0.0,
             ended: 0.0,
-            missing: 0.0,
             step_end,
             pull: Vec::new(),
             end: Vec::new(),
@@ -276,6 +275,14 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             Length::Within(_) => 0.0,
         };
         scheme
+    }
+
+    /// Treats contacts that forces press together in another way, so that it can be compared.
+    #[must_use]
+    pub fn treating(mut self, at_rest: AtRest) -> Self {
+        self.engine.treat(at_rest);
+        self.at_rest = at_rest;
+        self
     }
 
     /// Resolves all events up to simulated time `end` (s). When and how often it is called changes nothing of what happens.
@@ -297,28 +304,10 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             if self.engine.advance(until, &mut (&mut self.passages, &mut *observer), watch)?.is_break() {
                 return Ok(ControlFlow::Break(()));
             }
-            if self.engine.is_pressed() {
-                self.end_early();
-            } else if until >= end {
+            if until >= end {
                 return Ok(ControlFlow::Continue(()));
             }
         }
-    }
-
-    /// Ends the sub-step here and now: from now on it is as if it had been planned so.
-    ///
-    /// What forces give until the middle of a sub-step is in its chords and booked when it begins. The middle is earlier now.
-    fn end_early(&mut self) {
-        let now = self.engine.time();
-        let missing = 0.5 * (self.step_end - now);
-        let (mass, lag, _) = self.engine.lag(now);
-        let given = self.engine.lag(now + missing).1 - lag;
-        self.books.add_impulse(&self.forces, -self.forces.gravity * (mass * missing), -given);
-        let power = self.resting.power_of_surface() + self.engine.held(now).power_surface;
-        self.books.add_work_of_surface(-power * missing);
-        self.ended -= 2.0 * missing;
-        self.step_end = now;
-        self.missing = missing;
     }
 
     /// Chooses the length of the next sub-steps.
@@ -393,7 +382,7 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
 
     /// Ends a sub-step and starts the next.
     fn kick(&mut self) -> Result<(), Broken> {
-        let (ended, missing) = (self.ended, std::mem::take(&mut self.missing));
+        let ended = self.ended;
         let held = self.engine.take_held();
         self.books.held(&held);
         // What carried grains ends here. `Start::work` cannot tell it from contacts between grains.
@@ -406,7 +395,8 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             self.books.work_near_field += near_field;
             self.passages.gone.clear();
         }
-        let Self { engine, forces, laws, resting, pull, starts, end, domain, books, step, strengths, .. } = self;
+        let Self { engine, forces, laws, at_rest, resting, pull, starts, end, domain, books, step, strengths, .. } =
+            self;
         let step = *step;
         let strongest = pull.iter().map(|pull| pull.norm()).fold(forces.gravity.norm(), f64::max);
         let reach = Resting::reach(engine.largest_radius(), 2.0 * strongest, step);
@@ -419,18 +409,12 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
         engine.start_sub_step(&under, |surface, touches, grains, flights, accelerations| {
             end.clear();
             end.extend_from_slice(accelerations);
-            if missing > 0.0 {
-                for (slot, (flight, grain)) in flights.iter_mut().zip(grains.iter_mut()).enumerate() {
-                    if starts.get(slot).is_some_and(|start| start.id == grain.id) && flight.radius > 0.0 {
-                        flight.velocity -= end[slot] * missing;
-                        books.dissipated_grain += rotate(flight, grain, -resting.angular(slot) * missing);
-                    }
-                }
-            }
             outcome = forces.pull(grains, flights, *strengths, pull);
             accelerations.copy_from_slice(pull);
             let strongest = pull.iter().map(|pull| pull.norm()).fold(0.0, f64::max);
-            resting.find(surface, touches, grains, flights, pull, step, [&laws.grain, &laws.surface]);
+            if *at_rest == AtRest::Carried {
+                resting.find(surface, touches, grains, flights, pull, step, [&laws.grain, &laws.surface]);
+            }
             let both = 0.5 * (ended + step);
             if !resting.is_empty() {
                 resting.carry(grains, flights, accelerations, step);

@@ -54,8 +54,11 @@ pub fn sphere_sphere(a: &Flight, b: &Flight, shift: Vector3<f64>) -> Option<f64>
     None
 }
 
+/// Spheres under force overlap by no more than this many times the slack of [`sphere_sphere_yielding`] before they meet.
+pub const MOST_SLACKS: f64 = 4.0;
+
 /// As [`sphere_sphere`] for spheres under force, which may press against each other: a pair that touches already, nearer than ¼ `slack` (m), meets only where
-/// it would overlap by `slack` at some time up to `horizon` (s, epoch time), the end of the sub-step.
+/// its overlap would grow by `slack`, or beyond [`MOST_SLACKS`] times as much, until `horizon` (s, epoch time), the end of the sub-step.
 ///
 /// So what is left of an approach when a contact has come to rest makes no event as long as it leads nowhere. A pair that happens to be as near as that
 /// when a sub-step begins, and comes on, meets when it touches.
@@ -63,8 +66,11 @@ pub fn sphere_sphere(a: &Flight, b: &Flight, shift: Vector3<f64>) -> Option<f64>
 pub fn sphere_sphere_yielding(a: &Flight, b: &Flight, shift: Vector3<f64>, slack: f64, horizon: f64) -> Option<f64> {
     let base = a.time.max(b.time);
     let touching = a.radius + b.radius + 0.25 * slack;
-    if (b.position_at(base) - a.position_at(base) + shift).norm_squared() <= touching * touching {
-        let shrunk = |flight: &Flight| Flight { radius: flight.radius - 0.5 * slack, ..*flight };
+    let apart = (b.position_at(base) - a.position_at(base) + shift).norm_squared();
+    if apart <= touching * touching {
+        let overlap = (a.radius + b.radius - apart.sqrt()).max(0.0);
+        let yielded = (overlap + slack).min(MOST_SLACKS * slack);
+        let shrunk = |flight: &Flight| Flight { radius: flight.radius - 0.5 * yielded, ..*flight };
         sphere_sphere(&shrunk(a), &shrunk(b), shift).filter(|&time| time <= horizon)?;
     }
     sphere_sphere(a, b, shift)

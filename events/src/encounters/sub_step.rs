@@ -40,6 +40,34 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         flight.velocity += before.velocity(flight.time) - after.velocity(flight.time);
     }
 
+    /// How far chords depart from paths in this sub-step, m.
+    #[must_use]
+    pub fn sag(&self) -> f64 {
+        self.sag
+    }
+
+    /// Calls `visit` with every grain that is nearer to `grain` than `reach` (m) at `time` (s, epoch time), along the chords, and the way from
+    /// centre to centre (m).
+    pub fn touching(&self, grain: u32, time: f64, reach: f64, mut visit: impl FnMut(u32, Vector3<f64>)) {
+        let ours = self.flight(grain);
+        let place = ours.position_at(time);
+        let mut near = Near::default();
+        self.neighbors.add(grain, &mut near);
+        for (other, shift) in near.iter().filter(|&(other, _)| other != grain) {
+            let theirs = self.flight(other);
+            let apart = theirs.position_at(time) + shift - place;
+            let within = ours.radius + theirs.radius + reach;
+            if apart.norm_squared() < within * within {
+                visit(other, apart);
+            }
+        }
+    }
+
+    /// Brings a grain to `time` (s, epoch time), before it is deflected without having met anything itself.
+    pub fn bring(&mut self, grain: u32, time: f64) {
+        self.advance(grain, time);
+    }
+
     /// Starts a new sub-step like an epoch. `kick` is given the surface, all grains that are nearer to each other than `reach` (m), and all
     /// flights, as they are at that moment, to change their velocities (m/s) to those of the chords, and their accelerations (m/s²) to set; a
     /// grain that has been taken out has the radius 0. It gives the length of the sub-step (s), and

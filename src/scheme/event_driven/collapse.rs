@@ -38,6 +38,11 @@ impl Row {
         self.latest -= after;
     }
 
+    /// Whether a hit at `time` (s) comes within `within` (s) of the latest.
+    pub(super) fn goes_on(&self, time: f64, within: f64) -> bool {
+        time - self.latest <= within
+    }
+
     /// Whether another grain was hit in the row.
     pub(super) fn among_grains(&self) -> bool {
         self.partners.iter().any(|&partner| partner < SURFACE)

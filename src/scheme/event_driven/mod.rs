@@ -7,11 +7,12 @@ use impinge_events::{Domain, Encounter, Encounters, Flight, Surface};
 use nalgebra::Vector3;
 
 mod collapse;
+mod pressed;
 mod under_force;
 
 use self::collapse::{COLLAPSE_TIME, NO_ROW, Row, SURFACE};
-pub use self::under_force::Held;
 pub(super) use self::under_force::Under;
+pub use self::under_force::{AtRest, Held};
 use self::under_force::{UnderForce, energy};
 use super::{Broken, GrainCollision, Observer, Passage, Progress, SurfaceHit};
 use crate::grains::{Grain, NewGrain, Snapshot};
@@ -198,8 +199,6 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
 
     /// Resolves all events up to simulated time `end` (s). When and how often it is called changes nothing of what happens.
     ///
-    /// Under forces it stops earlier where [`is_pressed`](Self::is_pressed) says so.
-    ///
     /// # Errors
     /// A broken invariant: grains that overlap, or a state that is no number.
     pub fn advance(
@@ -233,10 +232,6 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             let now = self.epoch_start + time;
             if self.outrun && !self.force.acts {
                 self.start_epoch(time);
-            }
-            if self.is_pressed() {
-                self.time = now;
-                return Ok(ControlFlow::Continue(()));
             }
             self.since_watch += 1;
             if self.since_watch == ENCOUNTERS_PER_WATCH {
@@ -283,14 +278,24 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     fn is_collapsing(&mut self, time: f64, grain: u32, partner: u32, approach: f64) -> bool {
         let within = self.in_a_row;
         // Under force, a line comes to rest.
-        let in_line = !self.force.acts;
-        self.rows.get_mut(grain as usize).is_some_and(|row| row.note(time, within, partner, approach, in_line))
+        let in_line = !self.carries();
+        let at_once = self.force.acts && self.force.at_rest == AtRest::Colliding;
+        self.rows.get_mut(grain as usize).is_some_and(|row| {
+            let again = at_once && row.goes_on(time, within);
+            row.note(time, within, partner, approach, in_line) || again
+        })
+    }
+
+    /// Whether forces act, and contacts that they press together come to rest.
+    #[inline]
+    fn carries(&self) -> bool {
+        self.force.acts && self.force.at_rest == AtRest::Carried
     }
 
     /// The law of a contact in a collapse: elastic where grains fly apart after it, plastic where forces press them together until they rest. What
     /// loses nothing by its law loses nothing here.
     fn law_in_collapse(&self, law: &ContactLaw) -> ContactLaw {
-        if self.force.acts && law.restitution < 1.0 { ContactLaw { restitution: 0.0, ..*law } } else { ELASTIC }
+        if self.carries() && law.restitution < 1.0 { ContactLaw { restitution: 0.0, ..*law } } else { ELASTIC }
     }
 
     /// Two grains touch.
@@ -317,8 +322,11 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let elastic = normal * (2.0 * (first.velocity - second.velocity).dot(&normal) / (first.mass + second.mass));
         let late = self.synchronisation(time, [a, b], [-elastic * second.mass, elastic * first.mass]);
         let approach = (first.velocity - second.velocity + late[0] - late[1]).dot(&normal);
-        if self.force.acts && approach <= self.force.resting_speed_of_pairs {
-            return self.hold_pair(time, [a, b], [first, second], normal, overlap_over_radius);
+        let slow = self.force.acts && approach <= self.force.resting_speed_of_pairs;
+        if slow && self.carries() {
+            self.check(time, &ids, overlap_over_radius, &[])?;
+            self.hand_on(time, [a, b], normal);
+            return Ok(());
         }
         first.velocity += late[0];
         second.velocity += late[1];
@@ -327,7 +335,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let mut withheld = 0.0;
         // Both rows go on, whatever the first says.
         let approach = contact.approach_speed;
-        if self.is_collapsing(time, a, b, approach) | self.is_collapsing(time, b, a, approach) {
+        if slow | self.is_collapsing(time, a, b, approach) | self.is_collapsing(time, b, a, approach) {
             let lawful = contact.impulse.dissipated;
             contact = resolve_pair_under(&self.law_in_collapse(&self.laws.grain), &first, &second, normal, &external);
             withheld = (lawful - contact.impulse.dissipated).max(0.0);
@@ -377,9 +385,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             }
             contact.normal = Vector3::new(contact.normal.x, 0.0, contact.normal.z).normalize();
         }
-        if self.force.acts
-            && -(before.velocity - contact.velocity).dot(&contact.normal) <= self.resting_speed_at_surface(grain)
-        {
+        let slow = self.force.acts
+            && -(before.velocity - contact.velocity).dot(&contact.normal) <= self.resting_speed_at_surface(grain);
+        if slow && self.carries() {
             return self.hold_on_surface(time, grain, &before, &contact);
         }
         let elastic = contact.normal * (2.0 * (before.velocity - contact.velocity).dot(&contact.normal));
@@ -389,7 +397,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let mut resolved =
             resolve_surface_under(&self.laws.surface, &before, contact.normal, contact.velocity, external);
         let mut withheld = 0.0;
-        if self.is_collapsing(time, grain, SURFACE, resolved.approach_speed) {
+        if slow | self.is_collapsing(time, grain, SURFACE, resolved.approach_speed) {
             let (lawful, law) = (resolved.impulse.dissipated, self.law_in_collapse(&self.laws.surface));
             resolved = resolve_surface_under(&law, &before, contact.normal, contact.velocity, external);
             withheld = (lawful - resolved.impulse.dissipated).max(0.0);

@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 
 use impinge_events::calendar::Calendar;
-use impinge_events::{Bend, Flight, Surface, SurfaceContact, Touch, YIELDING};
+use impinge_events::{Bend, Flight, Surface, SurfaceContact, Touch};
 use nalgebra::Vector3;
 
 use super::EventDriven;
+use super::pressed::Pressed;
 use crate::grains::Grain;
 use crate::law::{Body, External, NearField};
 use crate::near_field::Singular;
@@ -16,15 +17,23 @@ use crate::scheme::resting::PAIR_REST;
 /// A contact under force whose approach speed is below this part of what the force gives in a sub-step has come to rest. A bouncing grain then
 /// comes to rest early by this part of a sub-step over 1 - e.
 const STICKING: f64 = 1e-8;
-/// A sub-step ends early once so many contacts a grain, and [`HOLDS`] more, have been held in it. One by one, grains that are pressed together
-/// come to rest as slowly as heat spreads; at a kick that is done for all of them at once, at the price of about so many of these events.
-const HOLDS_PER_GRAIN: f64 = 0.5;
-const HOLDS: f64 = 16.0;
-/// A sub-step that ends before this part of its length makes the next one more patient, twice as much each time: time goes on.
-const HASTY: f64 = 1.0 / 64.0;
 /// What a contact at rest leaves of an acceleration, out of the contact, over the whole of it: enough that rounding turns none of it inwards, or the
 /// contact would be met again and again at the same time.
 const RELIEF: f64 = 1.0 / (1u64 << 48) as f64;
+/// What becomes of a contact that forces press together. [`Carried`](Self::Carried) is how runs are done; the others are there to be compared with
+/// it (`examples/rest_treatments.rs`, docs/contacts-at-rest.md).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum AtRest {
+    /// Below what forces give in a few sub-steps it sticks, and contact forces carry it.
+    #[default]
+    Carried,
+    /// Below that speed it is elastic; nothing sticks or is carried.
+    Elastic,
+    /// It collides by its law, but a hit within 0.001 radii of flight (of the fastest grain) of the one before is elastic: the TC model (Luding &
+    /// McNamara 1998).
+    Colliding,
+}
+
 /// What acts in a sub-step.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::scheme) struct Under {
@@ -57,8 +66,6 @@ pub struct Held {
     pub work_surface: f64,
     /// Power of a moving surface on the grains that it carries since they came to rest on it in this sub-step, W.
     pub power_surface: f64,
-    /// How many contacts were held.
-    pub contacts: u64,
 }
 
 /// A grain that the surface carries until the end of the sub-step, or until it leaves.
@@ -77,6 +84,7 @@ pub(super) struct Support {
 /// What the engine keeps of forces.
 #[derive(Clone, Debug, Default)]
 pub(super) struct UnderForce {
+    pub(super) at_rest: AtRest,
     /// Whether they act: then the epoch is a sub-step, and somebody else says when the next one starts.
     pub(super) acts: bool,
     pub(super) under: Under,
@@ -92,10 +100,8 @@ pub(super) struct UnderForce {
     pub(super) supported: BTreeMap<u32, Support>,
     /// What contacts at rest did since it was last asked.
     pub(super) held: Held,
-    /// How many may be held until the sub-step ends early.
-    holds_left: u64,
-    /// By how much sub-steps are more patient than usual, as a power of two.
-    patience: i32,
+    /// Who pushes whom; kept for its memory.
+    pub(super) pressed: Pressed,
 }
 
 impl<S: Surface, C: Calendar> EventDriven<S, C> {
@@ -108,10 +114,6 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     ) {
         self.force.under = *under;
         let after = self.time - self.epoch_start;
-        let hasty = self.force.acts && after < HASTY * self.epoch;
-        self.force.patience = if hasty { self.force.patience + 1 } else { 0 };
-        let holds = HOLDS + HOLDS_PER_GRAIN * self.encounters.count() as f64;
-        self.force.holds_left = (holds * 2f64.powi(self.force.patience)) as u64;
         self.natural_epoch(after);
         self.force.acts = true;
         let (grains, mut length, mut strongest) = (&mut self.grains, 0.0, 0.0);
@@ -130,6 +132,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let sticks = self.laws.grain.restitution < 1.0;
         self.force.resting_speed_of_pairs =
             if sticks { PAIR_REST * strongest * length } else { self.force.resting_speed };
+        if self.force.at_rest == AtRest::Colliding {
+            (self.force.resting_speed, self.force.resting_speed_of_pairs) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+        }
         self.force.anchors.clear();
         if under.near_field.is_some() {
             let slots = 0..self.grains.len() as u32;
@@ -138,10 +143,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.begin(after, length);
     }
 
-    /// Whether so many contacts have come to rest that the sub-step should end.
-    #[must_use]
-    pub fn is_pressed(&self) -> bool {
-        self.force.acts && self.force.holds_left == 0
+    /// Chooses what becomes of contacts that forces press together.
+    pub(in crate::scheme) fn treat(&mut self, at_rest: AtRest) {
+        self.force.at_rest = at_rest;
     }
 
     /// What contacts at rest did until simulated time `time` (s), to which the run has been advanced, since it was last taken.
@@ -262,32 +266,6 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.force.anchors.get(grain as usize).copied().flatten()
     }
 
-    /// Two grains at rest against each other stay so until the end of the sub-step: what their chords approach is taken away by an impulse.
-    pub(super) fn hold_pair(
-        &mut self,
-        time: f64,
-        grains: [u32; 2],
-        bodies: [Body; 2],
-        normal: Vector3<f64>,
-        overlap_over_radius: f64,
-    ) -> Result<(), Broken> {
-        let ids = grains.map(|grain| self.grains[grain as usize].id);
-        let [first, second] = bodies;
-        let chords = grains.map(|grain| self.encounters.flight(grain).velocity);
-        // They part by a trifle, or their neighbours would press them together again without end.
-        let parting = YIELDING * first.radius.min(second.radius) / self.epoch;
-        let approach = ((chords[0] - chords[1]).dot(&normal) + parting).max(0.0);
-        let impulse = normal * (approach * first.mass * second.mass / (first.mass + second.mass));
-        let after = [first.velocity - impulse / first.mass, second.velocity + impulse / second.mass];
-        self.check(time, &ids, overlap_over_radius, &after)?;
-        self.force.held.dissipated_grain +=
-            impulse.dot(&(first.velocity - second.velocity + (after[0] - after[1]))) * 0.5;
-        self.force.held.contacts += 1;
-        self.force.holds_left = self.force.holds_left.saturating_sub(1);
-        self.deflect(&[(grains[0], after[0]), (grains[1], after[1])]);
-        Ok(())
-    }
-
     /// Approach speed (m/s) below which a grain has come to rest against the surface.
     pub(super) fn resting_speed_at_surface(&self, grain: u32) -> f64 {
         let grain = grain as usize;
@@ -327,8 +305,6 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         held.work_surface += work;
         held.dissipated_surface += 0.5 * before.mass * (before.velocity.norm_squared() - after.norm_squared()) + work;
         self.force.supported.insert(grain, support);
-        self.force.held.contacts += 1;
-        self.force.holds_left = self.force.holds_left.saturating_sub(1);
         Ok(())
     }
 
@@ -363,7 +339,13 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     /// The flight of a grain as it is at its local time: without forces the stored one.
     #[inline]
     pub(super) fn true_flight(&self, grain: u32) -> Flight {
-        let mut flight = *self.encounters.flight(grain);
+        self.true_flight_at(grain, self.encounters.flight(grain).time)
+    }
+
+    /// The flight of a grain as it will be at `time` (s, epoch time), if nothing happens to it until then.
+    #[inline]
+    pub(super) fn true_flight_at(&self, grain: u32, time: f64) -> Flight {
+        let mut flight = self.encounters.flight(grain).advanced_to(time);
         if self.force.acts {
             let bend = self.encounters.bend(grain);
             flight.position += bend.offset(flight.time);
