@@ -18,7 +18,7 @@ const GRAVITY: f64 = 9.81;
 /// m
 const RADIUS: f64 = 0.01;
 /// Sub-step, s.
-const STEP: f64 = 2e-4;
+const STEP: f64 = 1e-4;
 /// Deepest overlap, in radii: what grains may yield, and twice the sag g h² / 8 of their chords with as much again for forces that are not g.
 const DEEPEST: f64 = 1e-4;
 /// Speed that is rest, over that of a fall from a grain's radius.
@@ -140,5 +140,5 @@ fn plastic_grains_come_to_rest() {
 #[ignore = "minutes"]
 fn a_pile_of_2000_comes_to_rest() {
     // Friction of the deepest grains is several times their weight, and bends their paths by as much more.
-    comes_to_rest(2000, 0.3, 0.4, 0.75 * STEP, [2.0, 2.5]);
+    comes_to_rest(2000, 0.3, 0.4, STEP, [2.0, 2.5]);
 }
