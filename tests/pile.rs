@@ -140,5 +140,5 @@ fn plastic_grains_come_to_rest() {
 #[ignore = "minutes"]
 fn a_pile_of_2000_comes_to_rest() {
     // Friction of the deepest grains is several times their weight, and bends their paths by as much more.
-    comes_to_rest(2000, 0.3, 0.4, 0.75 * STEP, [2.0, 2.5]);
+    comes_to_rest(2000, 0.3, 0.4, 0.5 * STEP, [2.0, 2.5]);
 }
