@@ -247,7 +247,7 @@ impl SubStepping {
         let (count, length) = (grouped(self.count), quantity(self.length, "s"));
         writeln!(
             f,
-            "\n{count} sub-steps, the last of {length}; {} contacts at rest at the end",
+            "\n{count} sub-steps, the last of {length}; contacts at rest at the end: {}",
             grouped(self.resting_contacts.into())
         )
     }
