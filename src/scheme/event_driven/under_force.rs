@@ -43,7 +43,7 @@ pub(in crate::scheme) struct Under {
     pub(in crate::scheme) gravity: Vector3<f64>,
     /// The near field, as it acts between two grains that touch.
     pub(in crate::scheme) near_field: Option<NearField>,
-    /// Whether it is summed over all pairs, one by one.
+    /// Whether grains that collide see it as all others make it at that moment, and not only each other.
     pub(in crate::scheme) all_pairs: bool,
     /// How long a contact lasts for the impulse that forces give to it, s.
     pub(in crate::scheme) contact_time: f64,
@@ -219,8 +219,8 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     /// w = ½ tau (h - tau) - h²/12 is 0 on average: left to itself it makes a random walk of the energy. Grains that collide with
     /// v_c - w K (v_c + v_c') instead keep it, as v·Kv changes by (v_c' - v_c)·K (v_c' + v_c). Momentum is kept in any case.
     ///
-    /// Where the near field is not summed pair by pair, what is not of the two that collide stays as it was at the kick, and the energy drifts at
-    /// second order.
+    /// Where the near field is not summed pair by pair, or collisions lose energy, what is not of the two that collide stays as it was at the kick,
+    /// and the energy drifts at second order.
     pub(super) fn synchronisation<const N: usize>(
         &self,
         time: f64,
