@@ -2,9 +2,10 @@
 
 use toml::Value;
 
+use super::limits::{Checked, LARGEST, in_plane, not_negative, positive};
 use super::{
     Arrangement, Boundary, Contact, Distribution, Domain, Friction, Interference, Invalid, Radius, Scene, Source,
-    Surface, Vec3, forces,
+    Surface, forces,
 };
 
 /// Most grains that blocks and lattices of one scene may ask for. At the 600 bytes that a grain costs they fill 60 GB; more is
@@ -13,11 +14,6 @@ const GRAINS_MAX: u64 = 100_000_000;
 
 /// Most rows of the time history and most frames: each frame is a file, each row a look at all grains.
 const ROWS_MAX: u32 = 10_000_000;
-
-/// Largest magnitude of a number of the scene, its times apart, and smallest radius, density or width, in SI units. Energies and
-/// discriminants are products of several such numbers and must be numbers too; nothing that grains do is anywhere near.
-pub(crate) const LARGEST: f64 = 1e30;
-pub(crate) const SMALLEST: f64 = 1e-30;
 
 /// The times of the scene, which may be of any magnitude.
 const TIMES: [&str; 2] = ["run.until", "run.start"];
@@ -28,8 +24,6 @@ const TIMES: [&str; 2] = ["run.until", "run.start"];
 /// at an overlap of 1e-9 radii. (A dense gas of radius 9e-4 m at 1 km showed 2.7e-10 in 5 million collisions, one of 2e-4 m stopped at
 /// once.) Consequence: a domain reaches out to 1.1 million radii from the origin, and not further.
 const UNITS_IN_RADIUS: f64 = 4e9;
-
-pub(super) type Checked = Result<(), Invalid>;
 
 /// Validates all of a scene that belongs to no single source or surface.
 ///
@@ -309,30 +303,4 @@ fn planar(scene: &Scene) -> Checked {
         in_plane(&key("velocity"), velocity)?;
     }
     Ok(())
-}
-
-pub(super) fn in_plane(key: &str, vector: Vec3) -> Checked {
-    if vector[1] == 0.0 {
-        return Ok(());
-    }
-    let what = format!("{vector:?} points out of the plane y = 0");
-    Err(Invalid::new(key, what, "the scene is planar: set the second number to 0, or `domain.planar = false`"))
-}
-
-pub(super) fn positive(key: &str, value: f64, unit: &str) -> Checked {
-    if value <= 0.0 {
-        return Err(Invalid::new(key, format!("{value} {unit} is not above 0"), "give a number above 0"));
-    }
-    if value < SMALLEST {
-        let what = format!("{value:e} {unit} is too small to compute with");
-        return Err(Invalid::new(key, what, format!("give {SMALLEST:e} {unit} or more")));
-    }
-    Ok(())
-}
-
-pub(super) fn not_negative(key: &str, value: f64, remedy: &str) -> Checked {
-    if value >= 0.0 {
-        return Ok(());
-    }
-    Err(Invalid::new(key, format!("{value} is below 0"), remedy))
 }

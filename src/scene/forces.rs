@@ -1,6 +1,6 @@
 //! Do the forces of a scene make sense? Gravity, near field, sub-step, and the keys that mean nothing without forces.
 
-use super::check::{Checked, LARGEST, in_plane, not_negative, positive};
+use super::limits::{Checked, LARGEST, in_plane, not_negative, positive};
 use super::{Boundary, Invalid, NearField, Radius, Scene, Source, Substep, Summation};
 
 /// Most sub-steps of a run: at a microsecond each they take eleven days. More is a misplaced exponent.
