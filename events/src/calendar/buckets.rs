@@ -296,8 +296,10 @@ impl Calendar for Buckets {
 
     fn clear(&mut self) {
         self.owners.iter_mut().for_each(|owner| owner.event = never(Kind::Exit));
+        self.first.fill(NOBODY);
         self.present.clear();
-        (self.now, self.rate) = (0, 0.0);
+        (self.now, self.turn, self.waiting, self.passed, self.passed_before) = (0, 0, 0, 0, 0);
+        self.rate = 0.0;
     }
 
     #[inline]
@@ -377,6 +379,22 @@ mod tests {
                 schedule(&mut fast, &mut plain, owner, time + pause);
             }
         }
+    }
+
+    /// Events that had not come when the calendar was cleared came back, or were looked for without end, if none was scheduled after that.
+    #[test]
+    fn a_cleared_calendar_went_on_with_what_had_waited() {
+        let mut calendar = Buckets::default();
+        let event = |time| Event { time, kind: Kind::Grains, partner: 0 };
+        (0..64).for_each(|owner| calendar.schedule(owner, event(f64::from(owner * owner))));
+        for owner in 0..20 {
+            assert_eq!(calendar.next(), Some((owner, event(f64::from(owner * owner)))));
+            calendar.schedule(owner, event(1e4 + f64::from(owner)));
+        }
+        calendar.clear();
+        assert_eq!(calendar.next(), None);
+        calendar.schedule(3, event(1.0));
+        assert_eq!(calendar.next(), Some((3, event(1.0))));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! A grain can only touch grains in its own cell and the cells around it until it leaves its cell. The grid of cells moves at
 //! a constant velocity, so grains that fly side by side at that velocity never cross a cell. The grid has no bounds: cells
 //! are hashed into slots, so memory follows the grains and not the domain; grains of another cell that share a slot are
-//! passed over. In a periodic domain a whole number of cells tiles the period.
+//! passed over. In a periodic domain a whole number of cells tiles the period, and each has a slot of its own.
 //!
 //! Cells are bookkeeping: neither their size nor their drift can change a bit of a prediction.
 
@@ -23,7 +23,9 @@ const CROWD: usize = 4;
 const FEWEST_GRAINS: usize = 16;
 /// A new layout costs a look around for every grain: it is taken when it cuts the cost to this fraction.
 const WORTH_A_NEW_LAYOUT: f64 = 0.9;
+/// No grain. One bit is left beside the number of a grain, for [`TURNED`].
 const NOBODY: u32 = u32::MAX >> 1;
+/// A grain whose cell, as its stored position sees it, lies beyond the period: it cannot be looked at without a shift.
 const TURNED: u32 = 1 << 31;
 
 /// Smallest side (m) that a periodic domain may have for grains of this radius (m): eight radii and a little, or the image that a
@@ -36,7 +38,8 @@ pub fn least_period(radius: f64) -> f64 {
 /// A grain in the list of those that share its slot.
 #[derive(Clone, Copy, Debug)]
 struct Link {
-    /// The number of its cell, before it is taken modulo the number of slots: hardly ever that of another cell.
+    /// The number of its cell, before it is taken modulo the number of slots: hardly ever that of another cell, whose grains would be
+    /// looked at in vain.
     number: u32,
     /// The next one, and the bit [`TURNED`] if its own cell lies beyond the period.
     next: u32,
@@ -78,6 +81,7 @@ struct Place {
 
 /// At no end of the period.
 const INSIDE: u32 = 13;
+/// What a step along each axis adds to the number of one of the 27 cells around a cell.
 const THREE_TO: [u32; 3] = [1, 3, 9];
 const NOWHERE: Place = Place { cell: Vector3::new(0, 0, 0), edges: INSIDE };
 

@@ -1,4 +1,4 @@
-//! The table of cells: hashed, so that memory follows the grains and not the domain.
+//! The table of cells: hashed, so that memory follows the grains and not the domain; in a period, where cells are few enough, one slot a cell.
 
 /// Slots for each grain, at least: more cost memory, fewer are shared by cells.
 const SLOTS_PER_GRAIN: usize = 4;

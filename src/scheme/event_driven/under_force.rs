@@ -20,6 +20,7 @@ const STICKING: f64 = 1e-8;
 /// What a contact at rest leaves of an acceleration, out of the contact, over the whole of it: enough that rounding turns none of it inwards, or the
 /// contact would be met again and again at the same time.
 const RELIEF: f64 = 1.0 / (1u64 << 48) as f64;
+
 /// What becomes of a contact that forces press together. [`Carried`](Self::Carried) is how runs are done; the others are there to be compared with
 /// it (`examples/rest_treatments.rs`, docs/contacts-at-rest.md).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
