@@ -40,6 +40,7 @@ mod flight;
 mod lists;
 mod mesh;
 mod neighbors;
+mod prefetch;
 mod surface;
 
 pub use domain::Domain;

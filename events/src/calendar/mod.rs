@@ -80,6 +80,13 @@ pub trait Calendar: Default {
     /// The first event and its owner; it stays in the calendar.
     fn next(&mut self) -> Option<(u32, Event)>;
 
+    /// Adds to `owners` those whose events come soon: each in its turn, well before its event comes, and once. Those that were scheduled at
+    /// short notice are not among them, and a calendar that does not know adds none.
+    fn coming(&mut self, _owners: &mut Vec<u32>) {}
+
+    /// Asks the memory for what is kept of `owner`, if there is such an owner.
+    fn fetch(&self, _owner: u32) {}
+
     /// What else lies before `owner`.
     fn plan(&self, owner: u32) -> &Plan;
 

@@ -7,9 +7,11 @@ use crate::lists::Lists;
 use crate::neighbors::{Cells, Near};
 use crate::{Bend, Domain, Flight, NoSurface, Outlook, Surface};
 
+mod ahead;
 mod search;
 mod sub_step;
 
+use self::ahead::Ahead;
 use self::search::Search;
 pub use self::search::YIELDING;
 pub use self::sub_step::Touch;
@@ -109,6 +111,8 @@ pub struct Encounters<S: Surface = NoSurface, C: Calendar = Buckets> {
     looks: usize,
     /// The neighbours that were visited last, kept for its memory.
     near: Near,
+    /// Who comes soon.
+    ahead: Ahead,
 }
 
 impl<S: Surface, C: Calendar> Encounters<S, C> {
@@ -149,6 +153,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             crossings: 0,
             looks: 0,
             near: Near::default(),
+            ahead: Ahead::default(),
         }
     }
 
@@ -184,6 +189,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             if event.time > end {
                 return None;
             }
+            self.look_ahead();
             match event.kind {
                 Kind::Crossing => self.cross(owner, event.time),
                 Kind::Review => {

@@ -14,6 +14,7 @@ use nalgebra::Vector3;
 
 use self::layout::{FEWEST_PERIODIC_CELLS, Layout, contact_width};
 use self::slots::Slots;
+use crate::prefetch::prefetch;
 use crate::{Domain, Flight};
 
 /// A crossing costs about as much as so many looks at a neighbour (instruction counts of the jet of 8000 grains).
@@ -77,6 +78,17 @@ struct Place {
     cell: Vector3<i32>,
     /// At which ends of the period it lies: as the number of that of the 27 cells around a cell to which one would step there.
     edges: u32,
+}
+
+/// Some of the 27 cells around a cell and itself.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Region {
+    /// Number of the cell in the middle.
+    number: u32,
+    /// At which ends of the period it lies.
+    edges: u32,
+    /// The bits of the cells.
+    wanted: u32,
 }
 
 /// At no end of the period.
@@ -343,6 +355,55 @@ impl Cells {
     pub(crate) fn add_near(&self, position: Vector3<f64>, time: f64, near: &mut Near) {
         let (place, number, turned) = self.place(self.cell_of(position, time));
         self.add(place, Link { number, next: turned }, self.around, near);
+    }
+
+    /// Asks the memory for the place of grain `id`.
+    #[inline]
+    pub(crate) fn fetch_place(&self, id: u32) {
+        prefetch(&self.places, id as usize);
+        prefetch(&self.links, id as usize);
+    }
+
+    /// Where the next search for grain `id` will look: ahead, if it then crosses the side of its cell along `axis`, or else all around. At the
+    /// ends of a period that may be wrong: it serves to fetch from memory.
+    #[inline]
+    pub(crate) fn region_of_next_search(&self, id: u32, flight: &Flight, axis: Option<u8>) -> Region {
+        let Place { cell, edges } = self.places[id as usize];
+        let number = self.links[id as usize].number;
+        let Some(axis) = axis.map(usize::from) else { return Region { number, edges, wanted: self.around } };
+        let step = self.way_out(cell, flight, axis).map_or(1, |(step, _)| step);
+        let wanted = AHEAD[axis][usize::from(step > 0)] & self.around;
+        Region { number: number.wrapping_add(self.layout.along(axis, step)), edges, wanted }
+    }
+
+    /// Asks the memory for the cells of a region.
+    #[inline]
+    pub(crate) fn fetch_cells(&self, region: Region) {
+        let offsets = &self.offsets[region.edges as usize];
+        for row in 0..9 {
+            if region.wanted & 0b111 << (3 * row) != 0 {
+                self.slots.fetch(region.number.wrapping_add(offsets[3 * row + 1]));
+            }
+        }
+    }
+
+    /// Visits the first grain in each slot of a region.
+    #[inline]
+    pub(crate) fn visit_first_in_cells(&self, region: Region, mut visit: impl FnMut(u32)) {
+        let offsets = &self.offsets[region.edges as usize];
+        let mut occupied = 0;
+        for row in 0..9 {
+            if region.wanted & 0b111 << (3 * row) != 0 {
+                let number = region.number.wrapping_add(offsets[3 * row + 1]);
+                occupied |= u32::from(self.slots.glance(number).1) << (3 * row);
+            }
+        }
+        occupied &= region.wanted;
+        while occupied != 0 {
+            let around = occupied.trailing_zeros() as usize;
+            occupied &= occupied - 1;
+            visit(self.slots.glance(region.number.wrapping_add(offsets[around])).0);
+        }
     }
 
     /// Adds to `near` every grain in those of the 27 cells around a place whose bits are set.

@@ -1,5 +1,7 @@
 //! The table of cells: hashed, so that memory follows the grains and not the domain; in a period, where cells are few enough, one slot a cell.
 
+use crate::prefetch::prefetch;
+
 /// Slots for each grain, at least: more cost memory, fewer are shared by cells.
 const SLOTS_PER_GRAIN: usize = 4;
 /// Fewest slots.
@@ -56,6 +58,21 @@ impl Slots {
             }
         }
         before
+    }
+
+    /// Asks the memory for the slot of a cell.
+    #[inline]
+    pub(super) fn fetch(&self, number: u32) {
+        prefetch(&self.occupied, self.slot(number));
+        prefetch(&self.first, self.slot(number));
+    }
+
+    /// The first grain in the slot of a cell and whether the slots about it are occupied, or zeros where there is no such cell.
+    #[inline]
+    pub(super) fn glance(&self, number: u32) -> (u32, u8) {
+        let slot = self.slot(number);
+        let or_zero = |found: Option<(&u32, &u8)>| found.map_or((0, 0), |(&first, &occupied)| (first, occupied));
+        or_zero(self.first.get(slot).zip(self.occupied.get(slot)))
     }
 
     /// Whether the slots before (bit 0), of (bit 1) and after (bit 2) that of a cell are occupied.
