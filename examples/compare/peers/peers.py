@@ -25,8 +25,8 @@ POISSON, RAYLEIGH_FRACTION = 0.3, 0.1
 FRICTION = {"smooth": "0", "rough": "0.4"}
 # How far neighbour lists look beyond contact, and the width of bins, m: found to be the fastest.
 SKIN, BIN = "0.02", "0.1"
-# Steps between two looks at the grains near the plane: a hit is seen with the velocity of the look before.
-LOOKS = 20
+# Steps between two looks at the grains near the plane, where a contact lasts some 16 steps: a hit is seen with the velocity of the look before.
+LOOKS = 2
 
 
 def grains(count):
