@@ -43,7 +43,7 @@ mod neighbors;
 mod surface;
 
 pub use domain::Domain;
-pub use encounters::{Encounter, Encounters, Touch, YIELDING};
+pub use encounters::{Encounter, Encounters, Touch, Vicinity, YIELDING};
 pub use flight::{Bend, Flight};
 pub use mesh::{BadTriangle, Mesh};
 pub use neighbors::least_period;

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use impinge_events::calendar::Calendar;
-use impinge_events::{Bend, Flight, Surface, SurfaceContact, Touch};
+use impinge_events::contact_time::MOST_SLACKS;
+use impinge_events::{Bend, Flight, Surface, SurfaceContact, Vicinity, YIELDING};
 use nalgebra::Vector3;
 
 use super::EventDriven;
@@ -48,6 +49,8 @@ pub(in crate::scheme) struct Under {
     pub(in crate::scheme) all_pairs: bool,
     /// How long a contact lasts for the impulse that forces give to it, s.
     pub(in crate::scheme) contact_time: f64,
+    /// How deep grains that touch may go into each other before they meet again, over the smaller radius.
+    pub(in crate::scheme) penetration: f64,
 }
 
 /// What the treatment of contacts at rest did within sub-steps.
@@ -111,7 +114,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     pub(in crate::scheme) fn start_sub_step(
         &mut self,
         under: &Under,
-        kick: impl FnOnce(&S, &[Touch], &mut [Grain], &mut [Flight], &mut [Vector3<f64>]) -> (f64, f64),
+        kick: impl FnOnce(&S, &mut Vicinity<'_>, &mut [Grain], &mut [Flight], &mut [Vector3<f64>]) -> (f64, f64),
     ) {
         self.force.under = *under;
         let after = self.time - self.epoch_start;
@@ -121,13 +124,14 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let touching = &mut self.force.touching;
         touching.clear();
         touching.resize(grains.len(), false);
-        self.encounters.start_sub_step(after, under.reach, |surface, touches, flights, accelerations| {
-            for touch in touches {
+        let most_sag = (under.penetration / MOST_SLACKS - YIELDING) * self.smallest;
+        self.encounters.start_sub_step(after, under.reach, |surface, vicinity, flights, accelerations| {
+            for touch in vicinity.touches() {
                 touching[touch.a as usize] = true;
                 touching[touch.b as usize] = true;
             }
-            (length, strongest) = kick(surface, touches, grains, flights, accelerations);
-            (length, 0.125 * strongest * length * length)
+            (length, strongest) = kick(surface, vicinity, grains, flights, accelerations);
+            (length, (0.125 * strongest * length * length).min(most_sag))
         });
         self.force.resting_speed = STICKING * strongest * length;
         let sticks = self.laws.grain.restitution < 1.0;
