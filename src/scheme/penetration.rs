@@ -13,13 +13,13 @@ use nalgebra::Vector3;
 
 /// Halvings at the most: a part is no shorter than 1/1024 of the sub-step, and a run in which that does not help ends with its overlap.
 const MOST_HALVINGS: u32 = 10;
-/// The part of what is allowed that pairs may take that have yet to meet. What deflections within the sub-step add is left the rest: grains that come
-/// from elsewhere, and what a surface begins to carry.
+/// The part of what is allowed that contacts at rest may yield, and up to which others may go when they meet. What nobody foresees at a kick has the
+/// rest: grains that are deflected towards each other within the sub-step, and what a surface begins to carry.
 const SHARE: f64 = 0.75;
 /// Pairs that are that deep in each other already may still go this much deeper, over what is allowed: shorter parts would not bring them out.
-const LEAST_SHARE: f64 = 0.25;
+const LEAST_SHARE: f64 = 1.0 - SHARE;
 /// Parts become twice as long when this part of what is allowed is used: then four times as much still is a little less.
-const ROOM: f64 = 0.2;
+const ROOM: f64 = 0.22;
 
 /// The parts of a sub-step, of which each is the sub-step halved some times. One that is not split is its only part.
 #[derive(Clone, Debug)]
@@ -89,6 +89,12 @@ impl Parts {
     }
 }
 
+/// How far chords may depart from paths where grains touch, over the smallest radius: of that many times as much contacts yield, they take no more than their
+/// share of `penetration`.
+pub(super) fn most_sag(penetration: f64) -> f64 {
+    SHARE * penetration / MOST_SLACKS - YIELDING
+}
+
 /// Length of a part (s) of a sub-step of length `step` (s); exact, as is the sum of all parts.
 fn part(step: f64, halvings: u32) -> f64 {
     step / f64::from(1 << halvings)
@@ -119,7 +125,7 @@ impl Bends<'_> {
         let sag = 0.125 * self.step * self.step;
         let inside = || (0..).zip(self.flights).filter(|(_, flight)| flight.radius > 0.0);
         let smallest = inside().map(|(_, flight)| flight.radius).fold(f64::INFINITY, f64::min);
-        let mut deepest = MOST_SLACKS * yielding * sag / ((penetration - MOST_SLACKS * YIELDING) * smallest);
+        let mut deepest = yielding * sag / (most_sag(penetration) * smallest);
         // What two grains that bend less can do is left to any pair.
         let least = 0.5 * LEAST_SHARE * penetration * smallest;
         for (grain, flight) in inside() {
@@ -149,5 +155,48 @@ impl Bends<'_> {
         }
         let room = SHARE * penetration * radius + gap.min(0.0);
         parting.max(0.0) / room.max(LEAST_SHARE * penetration * radius)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Lengths of the parts of sub-steps of 1 s, as long as the last one is not over, where grains go so deep in parts of 1 s at these times.
+    fn parts_of(deep: impl Fn(f64) -> f64, until: f64) -> (Vec<f64>, Parts) {
+        let (mut parts, mut lengths, mut time) = (Parts::new(1e-4), Vec::new(), 0.0);
+        while time < until || !parts.are_over() {
+            let length = parts.next(1.0, |length| deep(time) * length * length);
+            assert!(deep(time) * length * length <= 1.0 || length == 1.0 / 1024.0, "{length} s at {time} s");
+            lengths.push(length);
+            time += length;
+        }
+        (lengths, parts)
+    }
+
+    #[test]
+    fn what_is_shallow_is_not_split() {
+        let (lengths, parts) = parts_of(|_| 1.0, 5.0);
+        assert_eq!(lengths, [1.0; 5]);
+        assert_eq!(parts.count(), (0, 0));
+    }
+
+    /// Sub-steps end when they would have ended anyway, and parts grow as soon as they may.
+    #[test]
+    fn parts_are_as_short_as_they_must_and_grow_again() {
+        let (lengths, parts) = parts_of(|time| if (1.3..1.6).contains(&time) { 100.0 } else { 0.5 }, 4.0);
+        assert_eq!(lengths.iter().sum::<f64>(), 4.0);
+        assert_eq!(lengths, [1.0; 4], "nobody looks within a sub-step that has begun");
+        assert_eq!(parts.count(), (0, 0));
+        let (lengths, parts) = parts_of(|time| if (1.0..1.3).contains(&time) { 15.0 } else { 0.5 }, 4.0);
+        assert_eq!(lengths, [1.0, 0.25, 0.25, 0.5, 1.0, 1.0]);
+        assert_eq!(parts.count(), (1, 3));
+    }
+
+    #[test]
+    fn nothing_is_split_without_end() {
+        let (lengths, parts) = parts_of(|_| f64::INFINITY, 1.0);
+        assert_eq!((lengths.len(), lengths[0]), (1024, 1.0 / 1024.0));
+        assert_eq!(parts.count(), (1, 1024));
     }
 }

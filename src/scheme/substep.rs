@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 use rustc_hash::FxHashMap;
 
 use super::event_driven::{AtRest, Held, Under};
-use super::penetration::{Bends, Parts};
+use super::penetration::{Bends, Parts, most_sag};
 use super::resting::Resting;
 use super::{Broken, EventDriven, Kick, Laws, Observer, Passage, Progress, Rest};
 use crate::grains::{Grain, NewGrain, kinetic_energy};
@@ -415,7 +415,20 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             self.passages.gone.clear();
         }
         let Self {
-            engine, forces, laws, at_rest, resting, parts, pull, starts, end, domain, books, step, strengths, ..
+            engine,
+            forces,
+            laws,
+            at_rest,
+            resting,
+            parts,
+            pull,
+            starts,
+            end,
+            domain,
+            books,
+            step,
+            strengths,
+            ..
         } = self;
         let whole = *step;
         let carries = *at_rest == AtRest::Carried;
@@ -428,8 +441,9 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
         // It costs a sum over all grains, and where collisions lose energy nobody sees a drift of second order.
         let lossless = laws.grain.restitution == 1.0;
         let all_pairs = lossless && forces.near_field.as_ref().is_some_and(|sum| sum.method() == Method::Direct);
-        let penetration = if carries { parts.penetration() } else { f64::INFINITY };
-        let under = Under { reach, gravity, near_field, all_pairs, contact_time: forces.contact_time, penetration };
+        let penetration = parts.penetration();
+        let most_sag = if carries { most_sag(penetration) } else { f64::INFINITY };
+        let under = Under { reach, gravity, near_field, all_pairs, contact_time: forces.contact_time, most_sag };
         let mut length = whole;
         engine.start_sub_step(&under, |surface, vicinity, grains, flights, accelerations| {
             end.clear();

@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 
 use impinge_events::calendar::Calendar;
-use impinge_events::contact_time::MOST_SLACKS;
-use impinge_events::{Bend, Flight, Surface, SurfaceContact, Vicinity, YIELDING};
+use impinge_events::{Bend, Flight, Surface, SurfaceContact, Vicinity};
 use nalgebra::Vector3;
 
 use super::EventDriven;
@@ -49,8 +48,8 @@ pub(in crate::scheme) struct Under {
     pub(in crate::scheme) all_pairs: bool,
     /// How long a contact lasts for the impulse that forces give to it, s.
     pub(in crate::scheme) contact_time: f64,
-    /// How deep grains that touch may go into each other before they meet again, over the smaller radius.
-    pub(in crate::scheme) penetration: f64,
+    /// How far chords may depart from paths, over the smallest radius, for contacts to yield as much.
+    pub(in crate::scheme) most_sag: f64,
 }
 
 /// What the treatment of contacts at rest did within sub-steps.
@@ -124,7 +123,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let touching = &mut self.force.touching;
         touching.clear();
         touching.resize(grains.len(), false);
-        let most_sag = (under.penetration / MOST_SLACKS - YIELDING) * self.smallest;
+        let most_sag = under.most_sag * self.smallest;
         self.encounters.start_sub_step(after, under.reach, |surface, vicinity, flights, accelerations| {
             for touch in vicinity.touches() {
                 touching[touch.a as usize] = true;
