@@ -181,7 +181,7 @@ mod tests {
         assert_eq!(parts.count(), (0, 0));
     }
 
-    /// Sub-steps end when they would have ended anyway, and parts grow as soon as they may.
+    /// Sub-steps end when they would have ended anyway. A part is twice as long as the one before at the most.
     #[test]
     fn parts_are_as_short_as_they_must_and_grow_again() {
         let (lengths, parts) = parts_of(|time| if (1.3..1.6).contains(&time) { 100.0 } else { 0.5 }, 4.0);
@@ -189,8 +189,8 @@ mod tests {
         assert_eq!(lengths, [1.0; 4], "nobody looks within a sub-step that has begun");
         assert_eq!(parts.count(), (0, 0));
         let (lengths, parts) = parts_of(|time| if (1.0..1.3).contains(&time) { 15.0 } else { 0.5 }, 4.0);
-        assert_eq!(lengths, [1.0, 0.25, 0.25, 0.5, 1.0, 1.0]);
-        assert_eq!(parts.count(), (1, 3));
+        assert_eq!(lengths, [1.0, 0.25, 0.25, 0.25, 0.25, 0.5, 0.5, 1.0]);
+        assert_eq!(parts.count(), (2, 6));
     }
 
     #[test]
