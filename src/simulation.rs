@@ -84,7 +84,8 @@ impl Simulation {
         let engine = EventDriven::new(&placed.grains, surface, domain(scene), laws, scene.run.start);
         let scheme = if scene.has_forces() {
             let forces = forces(scene, placed.grains.len() as u64)?;
-            Advance::UnderForces(Box::new(Substepped::new(engine, forces, laws, length(scene))))
+            let scheme = Substepped::new(engine, forces, laws, length(scene)).keeping_to(scene.penetration());
+            Advance::UnderForces(Box::new(scheme))
         } else {
             Advance::Freely(Box::new(engine))
         };

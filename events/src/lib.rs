@@ -44,7 +44,7 @@ mod prefetch;
 mod surface;
 
 pub use domain::Domain;
-pub use encounters::{Encounter, Encounters, Touch, YIELDING};
+pub use encounters::{Encounter, Encounters, Touch, Vicinity, YIELDING};
 pub use flight::{Bend, Flight};
 pub use mesh::{BadTriangle, Mesh};
 pub use neighbors::least_period;

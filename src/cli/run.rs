@@ -68,7 +68,7 @@ pub(super) fn run(args: &Args) -> Result<Ending, Failure> {
                 }
                 Broken::OutOfPlane { .. } => "give the scene a surface that does not change along y",
                 Broken::Overlap { allowed, .. } if allowed == LARGEST_OVERLAP_WITH_FORCES => {
-                    "take a shorter `substep`: the overlap of grains under unequal forces goes with its square"
+                    "take a shorter `substep` or a smaller `run.penetration`: the overlap of grains under unequal forces goes with the square of the sub-step"
                 }
                 Broken::Overlap { .. } | Broken::NotANumber { .. } => "please report the scene",
             };

@@ -217,6 +217,10 @@ pub struct Momentum {
 pub struct SubStepping {
     /// How many there were.
     pub count: u64,
+    /// How many of them were split, so that grains kept to `run.penetration`.
+    pub split: u64,
+    /// Into how many parts these were split, all together.
+    pub parts: u64,
     /// Length of the last one, s.
     pub length: f64,
     /// Contacts at rest at the end.
@@ -233,6 +237,8 @@ impl SubStepping {
     fn new(sub_steps: &SubSteps) -> Self {
         Self {
             count: sub_steps.count,
+            split: sub_steps.split,
+            parts: sub_steps.parts,
             length: sub_steps.length,
             resting_contacts: sub_steps.resting_contacts,
             force_error_of_contributions: sub_steps.near_field_error.map(|error| error.of_contributions),
@@ -249,7 +255,16 @@ impl SubStepping {
             f,
             "\n{count} sub-steps, the last of {length}; contacts at rest at the end: {}",
             grouped(self.resting_contacts.into())
-        )
+        )?;
+        match self.split {
+            0 => Ok(()),
+            split => writeln!(
+                f,
+                "{} of them split, into {} parts, so that grains do not go deeper into each other than they may",
+                grouped(split),
+                grouped(self.parts)
+            ),
+        }
     }
 }
 

@@ -12,6 +12,9 @@ const SWITCH_MIN: f64 = 0.5;
 /// Largest bound on the error of the tree; above it the sum is no longer an approximation of anything.
 const ACCURACY_MAX: f64 = 0.1;
 
+/// How deep grains may be allowed to go into each other, in radii: below, what contacts at rest yield (4e-6) is in the way, and above it, a run stops.
+const PENETRATION: [f64; 2] = [1e-5, 1e-3];
+
 /// Validates what has to do with forces.
 pub(super) fn check(scene: &Scene) -> Checked {
     if scene.domain.planar {
@@ -22,6 +25,7 @@ pub(super) fn check(scene: &Scene) -> Checked {
         summation(scene, near_field)?;
     }
     substep(scene)?;
+    penetration(scene)?;
     contact_time(scene)?;
     source_strengths(scene)
 }
@@ -30,7 +34,7 @@ fn substep(scene: &Scene) -> Checked {
     let of_near_field = scene.near_field.as_ref().and_then(|near_field| near_field.substep);
     if let Some(substep) = scene.run.substep {
         if !scene.has_forces() {
-            return Err(without_forces("run.substep", substep));
+            return Err(without_forces("run.substep", &format!("{substep} s")));
         }
         if of_near_field.is_some() {
             let what = format!("{substep} s, but `near_field.substep` gives a sub-step too");
@@ -56,6 +60,20 @@ fn substep(scene: &Scene) -> Checked {
             "give a number above 0 and below 1; 1e-6 is usual",
         )),
     }
+}
+
+fn penetration(scene: &Scene) -> Checked {
+    let Some(penetration) = scene.run.penetration else { return Ok(()) };
+    let key = "run.penetration";
+    if !scene.has_forces() {
+        return Err(without_forces(key, &format!("{penetration} radii")));
+    }
+    let [least, most] = PENETRATION;
+    if (least..=most).contains(&penetration) {
+        return Ok(());
+    }
+    let what = format!("{penetration} radii is outside [{least:e}, {most:e}]");
+    Err(Invalid::new(key, what, "give a number in there; 1e-4 is usual, and a smaller one makes more sub-steps"))
 }
 
 /// Refuses a sub-step that is not above 0, or with which the run would never end.
@@ -151,13 +169,13 @@ fn summation(scene: &Scene, near_field: &NearField) -> Checked {
 fn contact_time(scene: &Scene) -> Checked {
     let Some(time) = scene.contact.time else { return Ok(()) };
     if !scene.has_forces() {
-        return Err(without_forces("contact.time", time));
+        return Err(without_forces("contact.time", &format!("{time} s")));
     }
     positive("contact.time", time, "s")
 }
 
-fn without_forces(key: &str, time: f64) -> Invalid {
-    let what = format!("{time} s has no effect: no force acts in this scene");
+fn without_forces(key: &str, value: &str) -> Invalid {
+    let what = format!("{value} has no effect: no force acts in this scene");
     Invalid::new(key, what, "take it out, or add `run.gravity` or `[near_field]`")
 }
 

@@ -23,7 +23,7 @@ pub use contact::{Collapse, Contact, Contacts, Friction, Regularised, StaticDyna
 pub use error::{Invalid, SceneError};
 pub(crate) use limits::{LARGEST, SMALLEST};
 pub use load::{Overrides, SceneFile};
-pub use near_field::{Auto, NearField, Substep, Summation};
+pub use near_field::{Auto, DEFAULT_PENETRATION, NearField, Substep, Summation};
 pub use shape::schema;
 
 /// A vector as it stands in the file: `[x, y, z]`.
@@ -89,6 +89,9 @@ pub struct Run {
     /// Sub-step of a scene in which forces act, s; left out, as long as the local error allows. Where there is a `[near_field]`, give
     /// `near_field.substep` instead.
     pub substep: Option<f64>,
+    /// How deep grains may go into each other where forces act, in radii of the smaller one: from 1e-5 to 1e-3, and 1e-4 where left out. Sub-steps
+    /// in which the forces would press them deeper are split.
+    pub penetration: Option<f64>,
 }
 
 /// How time is advanced.

@@ -8,6 +8,9 @@ use super::Scene;
 /// Relative local error of a sub-step where the scene gives none.
 const DEFAULT_TOLERANCE: f64 = 1e-6;
 
+/// How deep grains may go into each other where forces act, over the smaller radius, where the scene does not say.
+pub const DEFAULT_PENETRATION: f64 = 1e-4;
+
 /// Where the smooth switch begins, over the cut-off, where the scene does not say.
 const DEFAULT_SWITCH: f64 = 0.8;
 
@@ -114,6 +117,12 @@ impl Scene {
         let of_near_field = self.near_field.as_ref().and_then(|near_field| near_field.substep);
         let of_run = self.run.substep.map(Substep::Fixed);
         of_near_field.or(of_run).unwrap_or(Substep::Chosen(Auto::Auto))
+    }
+
+    /// How deep grains may go into each other where forces act, over the smaller radius: `run.penetration`, or its default.
+    #[must_use]
+    pub fn penetration(&self) -> f64 {
+        self.run.penetration.unwrap_or(DEFAULT_PENETRATION)
     }
 
     /// The relative local error that a sub-step of `"auto"` may have: [`NearField::tolerance`], or its default.

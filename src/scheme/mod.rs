@@ -1,6 +1,7 @@
 //! Ways to advance time, and what each of them reports to its observers.
 
 mod event_driven;
+mod penetration;
 mod resting;
 mod substep;
 mod timetable;

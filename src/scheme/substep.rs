@@ -14,10 +14,12 @@ use nalgebra::Vector3;
 use rustc_hash::FxHashMap;
 
 use super::event_driven::{AtRest, Held, Under};
+use super::penetration::{Bends, Parts, most_sag};
 use super::resting::Resting;
 use super::{Broken, EventDriven, Kick, Laws, Observer, Passage, Progress, Rest};
 use crate::grains::{Grain, NewGrain, kinetic_energy};
 use crate::near_field::{ForceSum, MeasuredError, Method, Singular};
+use crate::scene::DEFAULT_PENETRATION;
 use crate::sum::{Sum, VectorSum};
 
 /// What acts on grains between events.
@@ -36,6 +38,10 @@ pub struct Forces {
 pub struct SubSteps {
     /// How many there were.
     pub count: u64,
+    /// How many of them were split, so that grains did not go deeper into each other than they may.
+    pub split: u64,
+    /// Into how many parts these were split, all together.
+    pub parts: u64,
     /// Length of the last one, s.
     pub length: f64,
     /// Contacts at rest at the end.
@@ -80,6 +86,8 @@ pub struct Substepped<S: Surface, C: Calendar = Buckets> {
     length: Length,
     /// Length of a sub-step, s.
     step: f64,
+    /// How they are split. What is said of a sub-step below holds of a part where there are such.
+    parts: Parts,
     /// Length of the sub-step that has ended, s.
     ended: f64,
     /// End of the current sub-step, simulated time, s.
@@ -259,6 +267,7 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             resting: Resting::default(),
             length,
             step: 0.0,
+            parts: Parts::new(DEFAULT_PENETRATION),
             ended: 0.0,
             step_end,
             pull: Vec::new(),
@@ -275,6 +284,13 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             Length::Within(_) => 0.0,
         };
         scheme
+    }
+
+    /// Lets grains go into each other by this part of the smaller radius at the most, and splits sub-steps in which they would go deeper.
+    #[must_use]
+    pub fn keeping_to(mut self, penetration: f64) -> Self {
+        self.parts = Parts::new(penetration);
+        self
     }
 
     /// Treats contacts that forces press together in another way, so that it can be compared.
@@ -297,7 +313,10 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
     ) -> Result<ControlFlow<()>, Broken> {
         loop {
             if self.engine.time() >= self.step_end {
-                self.choose_step()?;
+                if self.parts.are_over() {
+                    self.choose_step()?;
+                    self.steps += 1;
+                }
                 self.kick()?;
             }
             let until = end.min(self.step_end);
@@ -395,11 +414,26 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             self.books.work_near_field += near_field;
             self.passages.gone.clear();
         }
-        let Self { engine, forces, laws, at_rest, resting, pull, starts, end, domain, books, step, strengths, .. } =
-            self;
-        let step = *step;
+        let Self {
+            engine,
+            forces,
+            laws,
+            at_rest,
+            resting,
+            parts,
+            pull,
+            starts,
+            end,
+            domain,
+            books,
+            step,
+            strengths,
+            ..
+        } = self;
+        let whole = *step;
+        let carries = *at_rest == AtRest::Carried;
         let strongest = pull.iter().map(|pull| pull.norm()).fold(forces.gravity.norm(), f64::max);
-        let reach = Resting::reach(engine.largest_radius(), 2.0 * strongest, step);
+        let reach = Resting::reach(engine.largest_radius(), 2.0 * strongest, parts.longest(whole));
         let (gravity, mut outcome) = (forces.gravity, Ok(()));
         // Where contact lies within the switch of a cut-off, the force at contact is not that of the law: then that of the kick is kept.
         let plain_at_contact = |sum: &&ForceSum| sum.is_plain_within(2.0 * engine.largest_radius());
@@ -407,19 +441,33 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
         // It costs a sum over all grains, and where collisions lose energy nobody sees a drift of second order.
         let lossless = laws.grain.restitution == 1.0;
         let all_pairs = lossless && forces.near_field.as_ref().is_some_and(|sum| sum.method() == Method::Direct);
-        let under = Under { reach, gravity, near_field, all_pairs, contact_time: forces.contact_time };
-        engine.start_sub_step(&under, |surface, touches, grains, flights, accelerations| {
+        let penetration = parts.penetration();
+        let most_sag = if carries { most_sag(penetration) } else { f64::INFINITY };
+        let under = Under { reach, gravity, near_field, all_pairs, contact_time: forces.contact_time, most_sag };
+        let mut length = whole;
+        engine.start_sub_step(&under, |surface, vicinity, grains, flights, accelerations| {
             end.clear();
             end.extend_from_slice(accelerations);
             outcome = forces.pull(grains, flights, *strengths, pull);
-            accelerations.copy_from_slice(pull);
             let strongest = pull.iter().map(|pull| pull.norm()).fold(0.0, f64::max);
-            if *at_rest == AtRest::Carried {
-                resting.find(surface, touches, grains, flights, pull, step, [&laws.grain, &laws.surface]);
-            }
+            let step = parts.next(whole, |step| {
+                accelerations.copy_from_slice(pull);
+                if !carries {
+                    return 0.0;
+                }
+                resting.find(surface, vicinity.touches(), grains, flights, pull, step, [&laws.grain, &laws.surface]);
+                if !resting.is_empty() {
+                    resting.carry(grains, flights, accelerations, step);
+                } else if forces.near_field.is_none() {
+                    return 0.0;
+                }
+                let bends = Bends { flights, accelerations, gravity, ended, step };
+                let yielding = if resting.is_empty() { 0.0 } else { strongest };
+                bends.deepest(vicinity, yielding, penetration)
+            });
+            length = step;
             let both = 0.5 * (ended + step);
             if !resting.is_empty() {
-                resting.carry(grains, flights, accelerations, step);
                 books.impulse_surface += resting.force_of_surface() * both;
                 books.add_work_of_surface(resting.power_of_surface() * both);
             }
@@ -452,9 +500,8 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             (step, strongest)
         });
         outcome.map_err(|singular| self.engine.singular(&singular))?;
-        self.steps += 1;
-        self.ended = step;
-        self.step_end = self.engine.time() + step;
+        self.ended = length;
+        self.step_end = self.engine.time() + length;
         Ok(())
     }
 
@@ -552,7 +599,9 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             })
         });
         let near_field_error = measured.transpose().map_err(|singular| self.engine.singular(&singular))?;
-        Ok(SubSteps { count: self.steps, length: self.step, resting_contacts: self.resting.count(), near_field_error })
+        let (split, parts) = self.parts.count();
+        let resting_contacts = self.resting.count();
+        Ok(SubSteps { count: self.steps, split, parts, length: self.step, resting_contacts, near_field_error })
     }
 
     /// Sub-steps so far.

@@ -14,7 +14,7 @@ mod sub_step;
 use self::ahead::Ahead;
 use self::search::Search;
 pub use self::search::YIELDING;
-pub use self::sub_step::Touch;
+pub use self::sub_step::{Touch, Vicinity};
 
 /// What happens next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

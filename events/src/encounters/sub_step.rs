@@ -8,6 +8,31 @@ use crate::lists::{Lists, skin};
 use crate::neighbors::{Cells, Near};
 use crate::{Bend, Flight, Surface};
 
+/// Who is near whom when a sub-step begins, while all grains stand at time 0.
+#[derive(Debug)]
+pub struct Vicinity<'a> {
+    touches: &'a [Touch],
+    neighbors: &'a Neighbors,
+    /// Kept for its memory.
+    near: Near,
+}
+
+impl<'a> Vicinity<'a> {
+    /// All grains that are nearer to each other than the reach that was asked for, in the order of their numbers.
+    #[must_use]
+    pub fn touches(&self) -> &'a [Touch] {
+        self.touches
+    }
+
+    /// Calls `visit` with every grain that can soon touch `grain`, and perhaps with itself and with some that cannot, and the shift (m) of the
+    /// image that is meant.
+    pub fn around(&mut self, grain: u32, mut visit: impl FnMut(u32, Vector3<f64>)) {
+        self.near.clear();
+        self.neighbors.add(grain, &mut self.near);
+        self.near.iter().for_each(|(other, shift)| visit(other, shift));
+    }
+}
+
 /// Two grains that touch or nearly do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Touch {
@@ -68,22 +93,23 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         self.advance(grain, time);
     }
 
-    /// Starts a new sub-step like an epoch. `kick` is given the surface, all grains that are nearer to each other than `reach` (m), and all
-    /// flights, as they are at that moment, to change their velocities (m/s) to those of the chords, and their accelerations (m/s²) to set; a
+    /// Starts a new sub-step like an epoch. `kick` is given the surface, who is near whom, nearer than `reach` (m) above all, and all flights,
+    /// as they are at that moment, to change their velocities (m/s) to those of the chords, and their accelerations (m/s²) to set; a
     /// grain that has been taken out has the radius 0. It gives the length of the sub-step (s), and
     /// how far chords depart from paths in it (m): by so much grains that touch may overlap, beyond [`YIELDING`](crate::YIELDING), before they meet again.
     pub fn start_sub_step(
         &mut self,
         duration: f64,
         reach: f64,
-        kick: impl FnOnce(&S, &[Touch], &mut [Flight], &mut [Vector3<f64>]) -> (f64, f64),
+        kick: impl FnOnce(&S, &mut Vicinity<'_>, &mut [Flight], &mut [Vector3<f64>]) -> (f64, f64),
     ) {
         self.halt(duration);
         self.under_force = true;
         self.accelerations.resize(self.flights.len(), Vector3::zeros());
         let touches = self.touches(reach);
         let next;
-        (next, self.sag) = kick(&self.surface, &touches, &mut self.flights, &mut self.accelerations);
+        let mut vicinity = Vicinity { touches: &touches, neighbors: &self.neighbors, near: Near::default() };
+        (next, self.sag) = kick(&self.surface, &mut vicinity, &mut self.flights, &mut self.accelerations);
         self.resume(next);
     }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use impinge_events::calendar::Calendar;
-use impinge_events::{Bend, Flight, Surface, SurfaceContact, Touch};
+use impinge_events::{Bend, Flight, Surface, SurfaceContact, Vicinity};
 use nalgebra::Vector3;
 
 use super::EventDriven;
@@ -48,6 +48,8 @@ pub(in crate::scheme) struct Under {
     pub(in crate::scheme) all_pairs: bool,
     /// How long a contact lasts for the impulse that forces give to it, s.
     pub(in crate::scheme) contact_time: f64,
+    /// How far chords may depart from paths, over the smallest radius, for contacts to yield as much.
+    pub(in crate::scheme) most_sag: f64,
 }
 
 /// What the treatment of contacts at rest did within sub-steps.
@@ -111,7 +113,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     pub(in crate::scheme) fn start_sub_step(
         &mut self,
         under: &Under,
-        kick: impl FnOnce(&S, &[Touch], &mut [Grain], &mut [Flight], &mut [Vector3<f64>]) -> (f64, f64),
+        kick: impl FnOnce(&S, &mut Vicinity<'_>, &mut [Grain], &mut [Flight], &mut [Vector3<f64>]) -> (f64, f64),
     ) {
         self.force.under = *under;
         let after = self.time - self.epoch_start;
@@ -121,13 +123,14 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         let touching = &mut self.force.touching;
         touching.clear();
         touching.resize(grains.len(), false);
-        self.encounters.start_sub_step(after, under.reach, |surface, touches, flights, accelerations| {
-            for touch in touches {
+        let most_sag = under.most_sag * self.smallest;
+        self.encounters.start_sub_step(after, under.reach, |surface, vicinity, flights, accelerations| {
+            for touch in vicinity.touches() {
                 touching[touch.a as usize] = true;
                 touching[touch.b as usize] = true;
             }
-            (length, strongest) = kick(surface, touches, grains, flights, accelerations);
-            (length, 0.125 * strongest * length * length)
+            (length, strongest) = kick(surface, vicinity, grains, flights, accelerations);
+            (length, (0.125 * strongest * length * length).min(most_sag))
         });
         self.force.resting_speed = STICKING * strongest * length;
         let sticks = self.laws.grain.restitution < 1.0;

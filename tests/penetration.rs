@@ -1,0 +1,185 @@
+//! Grains do not sink into each other: whatever sub-step a scene gives, and whatever presses them, their overlap stays within a tolerance over the whole
+//! run. It is looked at where they collide, and of all pairs several times in each sub-step.
+
+mod common;
+
+use common::forced::{Scene, advance, attraction, block, floor, look, plane, rough, states};
+use common::{Log, smooth};
+use impinge::grains::NewGrain;
+use impinge::law::NearField;
+use impinge::observe::Ledger;
+use impinge::scene::DEFAULT_PENETRATION;
+use impinge::scheme::{Laws, Length, SubSteps};
+use nalgebra::Vector3;
+use rand::{RngExt as _, SeedableRng as _};
+
+const GRAVITY: f64 = 9.81;
+/// m
+const RADIUS: f64 = 0.01;
+/// kg/m³
+const DENSITY: f64 = 2500.0;
+/// Looks in a sub-step. No multiple of it is the end of a part.
+const LOOKS: f64 = 2.718;
+
+fn ball(position: Vector3<f64>, velocity: Vector3<f64>, radius: f64, density: f64) -> NewGrain {
+    NewGrain { position, velocity, spin: Vector3::zeros(), radius, density, strength: 1.0 }
+}
+
+/// `count` grains on a loose lattice, shaken, over the floor of a box in which they will make a pile about as high as wide.
+fn falling(count: u32, seed: u64, laws: Laws) -> Scene {
+    let side = RADIUS * (f64::from(count) / 2.0).cbrt() * 1.2;
+    let wall = |normal: [f64; 3]| plane(normal.map(|along| -side * along), normal);
+    let walls = [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]].map(wall);
+    let mut random = rand_pcg::Pcg64::seed_from_u64(seed);
+    let (spacing, row) = (2.2 * RADIUS, (2.0 * side / (2.2 * RADIUS)).floor() as u32);
+    let grains = (0..count).map(|number| {
+        let cell = Vector3::new(number % row, number / row % row, number / row / row).map(f64::from);
+        let corner = Vector3::new(-side, -side, 0.0).add_scalar(1.1 * RADIUS);
+        let velocity = Vector3::from_fn(|_, _| random.random_range(-0.3..0.3));
+        ball(corner + cell * spacing, velocity, RADIUS, DENSITY)
+    });
+    let surface = [floor()].into_iter().chain(walls).collect();
+    Scene { surface, laws, gravity: Vector3::z() * -GRAVITY, ..Scene::of(grains.collect()) }
+}
+
+/// What pressed how deep.
+struct Found {
+    /// Deepest overlap at a collision and at a look, over the smaller radius.
+    deepest: f64,
+    sub_steps: SubSteps,
+    ledger: Ledger,
+}
+
+/// Deepest overlap of any two grains at `time` (s), over the smaller radius.
+fn deepest(scene: &Scene, run: &impinge::scheme::Substepped<impinge::surface::Surface>, time: f64) -> f64 {
+    let states = states(run, time);
+    let overlaps = states.iter().enumerate().flat_map(|(k, (one, _))| {
+        states[..k].iter().map(move |(other, _)| {
+            let distance = scene.domain.nearest(one.position - other.position).norm();
+            (one.radius + other.radius - distance) / one.radius.min(other.radius)
+        })
+    });
+    overlaps.fold(0.0, f64::max)
+}
+
+/// Runs a scene until `until` (s) and looks at all pairs every `between` (s).
+fn press(scene: &Scene, length: Length, penetration: f64, between: f64, until: f64) -> Found {
+    let mut run = scene.start(length).keeping_to(penetration);
+    let mut observers = (Log::default(), Ledger::default());
+    look(&mut run, 0.0, &mut observers);
+    let mut worst = 0f64;
+    for number in 1..=(until / between) as u32 {
+        let time = between * f64::from(number);
+        advance(&mut run, time, &mut observers);
+        worst = worst.max(deepest(scene, &run, time));
+    }
+    let end = run.engine().time();
+    look(&mut run, end, &mut observers);
+    let (_, ledger) = observers;
+    let sub_steps = run.report().expect("finite forces");
+    Found { deepest: worst.max(ledger.max_overlap_over_radius()), sub_steps, ledger }
+}
+
+/// Fails where grains went deeper into each other than the tolerance, or books do not close. Gives what was found.
+fn keeps_to_the_tolerance(what: &str, scene: &Scene, step: f64, until: f64) -> Found {
+    let found = press(scene, Length::Fixed(step), DEFAULT_PENETRATION, step / LOOKS, until);
+    let Found { deepest, sub_steps, ledger } = &found;
+    eprintln!("{what}, sub-step {step}: {deepest:.2e} radii, {sub_steps:?}");
+    assert!(*deepest <= DEFAULT_PENETRATION, "{what}, sub-step {step}: {deepest:e}");
+    let momentum = ledger.relative_momentum_residual();
+    assert!(momentum < 1e-11, "{what}, sub-step {step}: momentum {momentum:e}");
+    found
+}
+
+/// Without it the same piles go three times and twice as deep (tolerance 1e-3, which changes nothing).
+#[test]
+fn a_pile_keeps_to_the_tolerance_at_any_sub_step() {
+    for seed in 1..=3 {
+        let scene = falling(300, seed, rough(0.3, 0.4));
+        for (step, splits) in [(4e-4, true), (2e-4, true), (1e-4, false)] {
+            let found = keeps_to_the_tolerance(&format!("pile {seed}"), &scene, step, 0.3);
+            assert!(found.sub_steps.split > 0 || !splits, "pile {seed}, sub-step {step}: nothing was split");
+            assert!(found.ledger.relative_energy_residual().abs() < 1e-3);
+        }
+    }
+    let scene = falling(300, 1, rough(0.3, 0.4));
+    let free = press(&scene, Length::Fixed(4e-4), 1e-3, 4e-4 / LOOKS, 0.3);
+    assert!(free.deepest > 2.0 * DEFAULT_PENETRATION, "there is nothing to keep to: {:e}", free.deepest);
+}
+
+/// Sub-steps that nobody in his senses would give: a hundredth of a second, in which a grain falls by a twentieth of its radius.
+#[test]
+fn a_pile_keeps_to_the_tolerance_at_an_absurd_sub_step() {
+    let found = keeps_to_the_tolerance("absurd", &falling(100, 1, rough(0.3, 0.4)), 1e-2, 0.5);
+    assert!(found.sub_steps.parts > 10 * found.sub_steps.split, "{:?}", found.sub_steps);
+}
+
+#[test]
+fn a_pile_of_plastic_grains_keeps_to_the_tolerance() {
+    for seed in 1..=2 {
+        keeps_to_the_tolerance(&format!("plastic {seed}"), &falling(100, seed, rough(0.0, 0.4)), 4e-4, 0.4);
+        keeps_to_the_tolerance(&format!("smooth {seed}"), &falling(100, seed, smooth(0.0, 0.0)), 4e-4, 0.4);
+    }
+}
+
+/// A grain of a hundred times the mass of the others falls on their pile.
+#[test]
+fn a_pile_under_a_heavy_grain_keeps_to_the_tolerance() {
+    let mut scene = falling(100, 1, rough(0.3, 0.4));
+    scene.grains.push(ball(Vector3::new(0.001, 0.002, 0.4), -Vector3::z(), 2.0 * RADIUS, 12.5 * DENSITY));
+    for step in [4e-4, 2e-4] {
+        let found = keeps_to_the_tolerance("under a heavy grain", &scene, step, 0.4);
+        assert!(found.sub_steps.split > 0);
+    }
+}
+
+/// 27 grains whose attraction presses them together.
+fn cluster(laws: Laws, strength: f64) -> Scene {
+    let near_field: Option<NearField> = Some(attraction(strength));
+    Scene { laws, near_field, ..Scene::of(block(3, 0.5, 1.2, 0.3)) }
+}
+
+#[test]
+fn a_cluster_under_strong_attraction_keeps_to_the_tolerance() {
+    for (what, laws) in [("plastic", rough(0.0, 0.3)), ("e = 0.5", rough(0.5, 0.3)), ("smooth", smooth(0.5, 0.5))] {
+        let found = keeps_to_the_tolerance(&format!("cluster, {what}"), &cluster(laws, 100.0), 2e-3, 1.0);
+        assert!(found.sub_steps.split > 0, "{what}");
+    }
+}
+
+/// Without a sub-step in the scene it is chosen so that its error stays small; that alone does not keep grains apart.
+#[test]
+fn chosen_sub_steps_keep_to_the_tolerance() {
+    let pile = press(&falling(100, 1, rough(0.3, 0.4)), Length::Within(1e-6), DEFAULT_PENETRATION, 1.1e-4, 0.4);
+    assert!(pile.deepest <= DEFAULT_PENETRATION, "pile: {:e}, {:?}", pile.deepest, pile.sub_steps);
+    let found = press(&cluster(rough(0.5, 0.3), 100.0), Length::Within(1e-4), DEFAULT_PENETRATION, 3e-4, 0.4);
+    assert!(found.deepest <= DEFAULT_PENETRATION, "cluster: {:e}, {:?}", found.deepest, found.sub_steps);
+}
+
+/// Where no sub-step is split, to look for what would have to be changes nothing.
+#[test]
+fn what_keeps_to_the_tolerance_anyway_keeps_every_bit() {
+    let scene = falling(100, 1, rough(0.3, 0.4));
+    let [kept, free] = [DEFAULT_PENETRATION, 1e-3].map(|penetration| {
+        let mut run = scene.start(Length::Fixed(1e-4)).keeping_to(penetration);
+        advance(&mut run, 0.3, &mut ());
+        (states(&run, 0.3), run.report().expect("finite forces"), run.resting())
+    });
+    assert!(kept.2 > 50, "{} contacts at rest", kept.2);
+    assert_eq!((kept.1.split, kept.1.count), (0, 3000));
+    assert_eq!(kept.0, free.0);
+}
+
+#[test]
+fn one_thread_and_two_split_alike() {
+    let [one, two] = [1, 2].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| {
+            let mut run = cluster(rough(0.5, 0.3), 100.0).start(Length::Fixed(2e-3));
+            advance(&mut run, 0.5, &mut ());
+            (states(&run, 0.5), run.report().expect("finite forces"))
+        })
+    });
+    assert!(one.1.split > 0);
+    assert_eq!(one, two);
+}
