@@ -3,6 +3,8 @@
 mod event_driven;
 mod penetration;
 mod resting;
+pub mod soft_sphere;
+pub mod stepped;
 mod substep;
 mod timetable;
 
