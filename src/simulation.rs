@@ -6,14 +6,14 @@ use std::path::Path;
 use impinge_events::Domain;
 use nalgebra::Vector3;
 
-use crate::grains::NewGrain;
+use crate::grains::{NewGrain, Snapshot};
 use crate::law::{ContactLaw, Friction};
 use crate::law::{NearField, Term};
 use crate::near_field::{Bound, CutOff, ForceSum, Method};
-use crate::scene::{Boundary, Interference, Invalid, Scene};
-use crate::scene::{Substep, Summation};
+use crate::scene::{self, Boundary, Interference, Invalid, Scene, Substep, Summation};
+use crate::scheme::stepped::{Comparator, Crowd, Stepped, Steps};
 use crate::scheme::{Broken, EventDriven, Forces, Laws, Length, Moments, Observer, Progress, SubSteps, Substepped};
-use crate::source::{self, Displacement, Nozzle};
+use crate::source::{self, Displacement, Nozzle, Placed};
 use crate::surface::Surface;
 
 /// Skin of the neighbour lists of a near field with a cut-off, over the cut-off.
@@ -101,14 +101,7 @@ impl Simulation {
             let after = nozzle.opens() - scene.run.start;
             nozzle.check_clear(&|centre, radius| overlap(centre, radius, after))?;
         }
-        let laws = laws(scene)?;
-        let engine = EventDriven::new(&placed.grains, surface, domain(scene), laws, scene.run.start);
-        let scheme = if scene.has_forces() {
-            let forces = forces(scene, placed.grains.len() as u64)?;
-            Advance::UnderForces(Box::new(Substepped::new(engine, forces, laws, length(scene))))
-        } else {
-            Advance::Freely(Box::new(engine))
-        };
+        let scheme = Advance::new(scene, &placed, surface)?;
         let moments = |count| Moments::new(scene.run.start, scene.run.until, count);
         Ok(Self {
             scheme,
@@ -141,16 +134,15 @@ impl Simulation {
                     self.samples.advance();
                 }
                 Stop::Frame(number) => {
-                    self.scheme.engine().snapshot(time, |snapshot| observer.frame(number, snapshot));
+                    self.scheme.snapshot(time, |snapshot| observer.frame(number, snapshot));
                     self.frames.advance();
                 }
                 Stop::Entry(nozzle) => {
                     let Self { scheme, nozzles, displacement, .. } = self;
                     let entering = nozzles[nozzle].enter(time, &mut |place, radius| {
-                        let engine = scheme.engine();
-                        let inside = engine.surface().overlaps(place, radius, time - engine.epoch_start());
+                        let inside = scheme.surface().overlaps(place, radius, time - scheme.surface_time());
                         inside.is_none_or(|(_, depth)| source::just_touches(depth, radius))
-                            && engine.is_free(place, radius, time)
+                            && scheme.is_free(place, radius, time)
                     });
                     if let Some(mut grain) = entering {
                         if let Some((domain, displacement)) = displacement {
@@ -159,7 +151,10 @@ impl Simulation {
                         scheme.enter(time, &grain, observer);
                     }
                 }
-                Stop::End => return Ok(Outcome { time, interrupted: false }),
+                Stop::End => {
+                    self.scheme.finish(observer);
+                    return Ok(Outcome { time, interrupted: false });
+                }
             }
         }
     }
@@ -176,8 +171,17 @@ impl Simulation {
     /// Grains between which there is no finite force.
     pub fn sub_steps(&mut self) -> Result<Option<SubSteps>, Broken> {
         match &mut self.scheme {
-            Advance::Freely(_) => Ok(None),
+            Advance::Freely(_) | Advance::Stepped(_) => Ok(None),
             Advance::UnderForces(scheme) => scheme.report().map(Some),
+        }
+    }
+
+    /// How the steps of a time-stepped scheme went; none where time goes from event to event.
+    #[must_use]
+    pub fn steps(&self) -> Option<Steps> {
+        match &self.scheme {
+            Advance::Freely(_) | Advance::UnderForces(_) => None,
+            Advance::Stepped(scheme) => Some(scheme.steps()),
         }
     }
 
@@ -190,7 +194,7 @@ impl Simulation {
     /// The surface.
     #[must_use]
     pub fn surface(&self) -> &Surface {
-        self.scheme.engine().surface()
+        self.scheme.surface()
     }
 
     /// Whatever comes first; at equal times in the order in which they stand here, so that a sample at the end sees the end.
@@ -207,8 +211,9 @@ impl Simulation {
 
     /// Shows observers the moment at which a run was broken off as its last sample.
     fn break_off(&mut self, observer: &mut impl Observer) -> Result<Outcome, Broken> {
-        let time = self.scheme.engine().time();
+        let time = self.scheme.time();
         self.scheme.sample(time, observer)?;
+        self.scheme.finish(observer);
         Ok(Outcome { time, interrupted: true })
     }
 }
@@ -220,9 +225,26 @@ enum Advance {
     Freely(Box<EventDriven<Surface>>),
     /// In sub-steps.
     UnderForces(Box<Substepped<Surface>>),
+    /// In steps.
+    Stepped(Box<Stepped<Comparator>>),
 }
 
 impl Advance {
+    fn new(scene: &Scene, placed: &Placed, surface: Surface) -> Result<Self, Invalid> {
+        let (laws, domain) = (laws(scene)?, domain(scene));
+        let forces = forces(scene, placed.grains.len() as u64)?;
+        if scene.run.scheme != scene::Scheme::EventDriven {
+            let crowd = Crowd::new(&placed.grains, surface, domain, laws, forces, scene.run.start);
+            let comparator = Comparator::new(scene, &crowd)?;
+            return Ok(Self::Stepped(Box::new(Stepped::new(crowd, comparator))));
+        }
+        let engine = EventDriven::new(&placed.grains, surface, domain, laws, scene.run.start);
+        Ok(match scene.has_forces() {
+            true => Self::UnderForces(Box::new(Substepped::new(engine, forces, laws, length(scene)))),
+            false => Self::Freely(Box::new(engine)),
+        })
+    }
+
     fn advance(
         &mut self,
         end: f64,
@@ -232,29 +254,76 @@ impl Advance {
         match self {
             Self::Freely(engine) => engine.advance(end, observer, watch),
             Self::UnderForces(scheme) => scheme.advance(end, observer, watch),
+            Self::Stepped(scheme) => scheme.advance(end, observer, watch),
         }
     }
 
     /// Tells the observer what forces did and shows it all grains.
     fn sample(&mut self, time: f64, observer: &mut impl Observer) -> Result<(), Broken> {
-        if let Self::UnderForces(scheme) = self {
-            scheme.tell(time, observer)?;
+        match self {
+            Self::Freely(_) => {}
+            Self::UnderForces(scheme) => scheme.tell(time, observer)?,
+            Self::Stepped(scheme) => scheme.tell(observer)?,
         }
-        self.engine().snapshot(time, |snapshot| observer.sample(snapshot));
+        self.snapshot(time, |snapshot| observer.sample(snapshot));
         Ok(())
+    }
+
+    fn snapshot(&self, time: f64, look: impl FnOnce(&Snapshot<'_>)) {
+        match self {
+            Self::Freely(engine) => engine.snapshot(time, look),
+            Self::UnderForces(scheme) => scheme.engine().snapshot(time, look),
+            Self::Stepped(scheme) => scheme.crowd().snapshot(time, look),
+        }
     }
 
     fn enter(&mut self, time: f64, grain: &NewGrain, observer: &mut impl Observer) {
         match self {
             Self::Freely(engine) => engine.enter(time, grain, observer),
             Self::UnderForces(scheme) => scheme.enter(time, grain, observer),
+            Self::Stepped(scheme) => scheme.enter(grain, observer),
         }
     }
 
-    fn engine(&self) -> &EventDriven<Surface> {
+    /// Whether a grain of this radius (m) at `place` (m) overlaps no other at simulated time `time` (s), to which the run has been advanced.
+    fn is_free(&self, place: Vector3<f64>, radius: f64, time: f64) -> bool {
         match self {
-            Self::Freely(engine) => engine,
-            Self::UnderForces(scheme) => scheme.engine(),
+            Self::Freely(engine) => engine.is_free(place, radius, time),
+            Self::UnderForces(scheme) => scheme.engine().is_free(place, radius, time),
+            Self::Stepped(scheme) => scheme.crowd().is_free(place, radius),
+        }
+    }
+
+    /// Tells what has begun and not ended when the run is over.
+    fn finish(&mut self, observer: &mut impl Observer) {
+        if let Self::Stepped(scheme) = self {
+            scheme.finish(observer);
+        }
+    }
+
+    fn surface(&self) -> &Surface {
+        match self {
+            Self::Freely(engine) => engine.surface(),
+            Self::UnderForces(scheme) => scheme.engine().surface(),
+            Self::Stepped(scheme) => scheme.crowd().surface(),
+        }
+    }
+
+    /// Simulated time from which the times of the surface count, s.
+    fn surface_time(&self) -> f64 {
+        match self {
+            Self::Freely(engine) => engine.epoch_start(),
+            Self::UnderForces(scheme) => scheme.engine().epoch_start(),
+            Self::Stepped(scheme) => scheme.crowd().time(),
+        }
+    }
+
+    /// Simulated time that has been reached, s.
+    fn time(&self) -> f64 {
+        match self {
+            Self::Freely(engine) => engine.time(),
+            Self::UnderForces(scheme) => scheme.engine().time(),
+            Self::Stepped(scheme) => scheme.crowd().time(),
         }
     }
 }

@@ -5,7 +5,7 @@ use toml::Value;
 use super::limits::{Checked, LARGEST, in_plane, not_negative, positive};
 use super::{
     Arrangement, Boundary, Contact, Distribution, Domain, Friction, Interference, Invalid, Radius, Scene, Source,
-    Surface, forces,
+    Surface, forces, stepped,
 };
 
 /// Most grains that blocks and lattices of one scene may ask for. At the 600 bytes that a grain costs they fill 60 GB; more is
@@ -39,6 +39,7 @@ pub fn check(scene: &Scene) -> Checked {
     sources(scene)?;
     resolved(scene)?;
     forces::check(scene)?;
+    stepped::check(scene)?;
     if scene.domain.planar { planar(scene) } else { Ok(()) }
 }
 

@@ -6,7 +6,7 @@ use toml::de::DeTable;
 use toml::{Table, Value};
 
 use super::key::{Caret, KeyPath};
-use super::{Invalid, Scene, SceneError, check, later, shape};
+use super::{Invalid, Scene, SceneError, check, shape};
 
 /// What the command line changes in a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -86,7 +86,6 @@ impl SceneFile {
         let overrides = apply(&mut table, path, overrides)?;
         let place = Place { path, text, overrides: &overrides };
 
-        later::refuse(&table).map_err(|invalid| place.of(invalid, Caret::Value))?;
         shape::check(&table).map_err(|(invalid, caret)| place.of(invalid, caret))?;
         let scene: Scene = table.try_into().map_err(|error| syntax(path, text, &error))?;
         check::check(&scene).map_err(|invalid| place.of(invalid, Caret::Value))?;

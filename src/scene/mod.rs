@@ -8,11 +8,11 @@ mod contact;
 mod error;
 mod forces;
 mod key;
-mod later;
 mod limits;
 mod load;
 mod near_field;
 mod shape;
+mod stepped;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -25,6 +25,7 @@ pub(crate) use limits::{LARGEST, SMALLEST};
 pub use load::{Overrides, SceneFile};
 pub use near_field::{Auto, NearField, Substep, Summation};
 pub use shape::schema;
+pub use stepped::{FixedPoint, SoftSphere, Trapezoidal};
 
 /// A vector as it stands in the file: `[x, y, z]`.
 pub type Vec3 = [f64; 3];
@@ -50,6 +51,12 @@ pub struct Scene {
     pub contact: Contacts,
     /// The force between grains; left out, there is none and no sub-step for it.
     pub near_field: Option<NearField>,
+    /// How the fixed-point scheme steps; with `run.scheme = "fixed-point"` only.
+    pub fixed_point: Option<FixedPoint>,
+    /// How the trapezoidal scheme steps; with `run.scheme = "trapezoidal"` only.
+    pub trapezoidal: Option<Trapezoidal>,
+    /// How stiff soft spheres are, and how they are stepped; with `run.scheme = "soft-sphere"` only.
+    pub soft_sphere: Option<SoftSphere>,
     /// Where grains come from.
     #[serde(default)]
     pub source: Vec<Source>,
@@ -98,6 +105,12 @@ pub enum Scheme {
     /// From one predicted collision to the next.
     #[default]
     EventDriven,
+    /// In steps, with contacts as impulses found by fixed-point iteration (Arbelaez et al. 2009).
+    FixedPoint,
+    /// In steps of the trapezoidal rule, with contacts as impulses (Mukherjee & Zohdi 2015).
+    Trapezoidal,
+    /// In steps much shorter than a contact, with contacts as forces (Huang, Chan & Zamankhan 2010).
+    SoftSphere,
 }
 
 /// Which collisions take part, so that first-order and repeated-collision energetics come from the same scene.

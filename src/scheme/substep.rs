@@ -222,7 +222,7 @@ impl Books {
 
 impl Forces {
     /// Writes what acts on each grain (m/s²) to `pull`.
-    fn pull(
+    pub(super) fn pull(
         &mut self,
         grains: &[Grain],
         flights: &[Flight],

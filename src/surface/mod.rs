@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use impinge_events::contact_time::{APPROACH_ROUNDING, Sweep, sphere_plane, sphere_plane_bent};
-use impinge_events::{Bend, Flight, Outlook, SurfaceContact};
+use impinge_events::{Bend, Flight, Mesh, Outlook, SurfaceContact};
 use nalgebra::Vector3;
 
 use crate::scene::{self, Invalid, Vec3};
@@ -17,6 +17,10 @@ mod mesh;
 /// Largest y of a unit normal that still counts as lying in the plane of a planar scene: STL files keep seven digits. What is
 /// left is dropped at each hit, so the grain is turned by as much.
 pub const LARGEST_SLOPE: f64 = 1e-5;
+
+/// Points nearer to each other than this part of a radius are one: nearest points of two triangles that share an edge differ by the rounding of
+/// their coordinates, 3e-10 radii at the most ([`scene`] keeps domains that small).
+const SAME_POINT: f64 = 1e-8;
 
 /// Three corners, m.
 pub type Triangle = [Vector3<f64>; 3];
@@ -123,6 +127,21 @@ impl Surface {
     pub fn overlaps(&self, position: Vector3<f64>, radius: f64, time: f64) -> Option<(u32, f64)> {
         let overlaps = self.parts.iter().filter_map(|part| part.overlap(position - part.displacement(time), radius));
         overlaps.reduce(|deepest, other| if other.1 > deepest.1 { other } else { deepest })
+    }
+
+    /// Distance between a sphere and the surface (m), both as they are at the local time of `flight`: exact below `reach` (m), negative where they
+    /// overlap; `reach` or more where it is more.
+    #[must_use]
+    pub fn gap(&self, flight: &Flight, reach: f64) -> f64 {
+        self.parts.iter().map(|part| part.gap(flight, reach)).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Adds to `found` every contact of `flight`, as it is at its local time, whose gap is less than `reach` (m): one for each point where the
+    /// distance to the surface is smallest among its neighbours, so that internal edges and corners of a mesh add none.
+    pub fn contacts(&self, flight: &Flight, reach: f64, found: &mut Vec<(u32, SurfaceContact)>) {
+        for part in &self.parts {
+            part.contacts(flight, reach, found);
+        }
     }
 
     /// Refuses a mesh that would push the grains of a planar scene out of the plane y = 0.
@@ -293,6 +312,66 @@ impl Part {
                         visit(self.first_element + element, contact);
                     }
                 });
+            }
+        }
+    }
+
+    fn gap(&self, flight: &Flight, reach: f64) -> f64 {
+        let centre = self.seen(flight).position;
+        match &self.shape {
+            Shape::Plane { point, normal } => (centre - point).dot(normal) - flight.radius,
+            Shape::Mesh(mesh) => {
+                let nearest = mesh.0.nearest(&centre, flight.radius + reach);
+                nearest.map_or(reach, |(_, distance)| distance - flight.radius)
+            }
+        }
+    }
+
+    fn contacts(&self, flight: &Flight, reach: f64, found: &mut Vec<(u32, SurfaceContact)>) {
+        let (centre, velocity) = (self.seen(flight).position, self.velocity);
+        let offer = |element, normal, gap| (self.first_element + element, SurfaceContact { normal, gap, velocity });
+        match &self.shape {
+            Shape::Plane { point, normal } => {
+                let gap = (centre - point).dot(normal) - flight.radius;
+                found.extend((gap < reach).then(|| offer(0, *normal, gap)));
+            }
+            Shape::Mesh(mesh) => {
+                let first = found.len();
+                mesh.0.within(&centre, flight.radius + reach, &mut |element, nearest| {
+                    let arm = centre - nearest;
+                    let distance = arm.norm();
+                    if distance > 0.0 {
+                        found.push(offer(element, arm / distance, distance - flight.radius));
+                    }
+                });
+                if found.len() > first + 1 {
+                    self.keep_nearest(mesh.0.mesh(), centre, flight.radius, found, first);
+                }
+            }
+        }
+    }
+
+    /// Of the contacts from `first` on, drops those whose nearest point lies on another triangle too that comes nearer elsewhere, or as near and
+    /// has a lower number.
+    fn keep_nearest(
+        &self,
+        mesh: &Mesh,
+        centre: Vector3<f64>,
+        radius: f64,
+        found: &mut Vec<(u32, SurfaceContact)>,
+        first: usize,
+    ) {
+        found[first..].sort_unstable_by(|a, b| a.1.gap.total_cmp(&b.1.gap).then(a.0.cmp(&b.0)));
+        // From the back, so that each is compared with all that come nearer, dropped ones too: the surface goes on from triangle to triangle.
+        for k in (first + 1..found.len()).rev() {
+            let contact = found[k].1;
+            let point = centre - contact.normal * (contact.gap + radius);
+            let shared = found[first..k].iter().any(|(nearer, _)| {
+                let on_nearer = mesh.nearest((nearer - self.first_element) as usize, &point);
+                (on_nearer - point).amax() <= SAME_POINT * radius
+            });
+            if shared {
+                found.remove(k);
             }
         }
     }

@@ -571,7 +571,7 @@ fn broken(time: f64, ids: &[u64], overlap: f64, allowed: f64, numbers: bool) -> 
 }
 
 /// The grains in an order in which those that are near in space are near in memory: row by row of cubes that hold a few of them.
-fn side_by_side(grains: &[NewGrain]) -> Vec<usize> {
+pub(super) fn side_by_side(grains: &[NewGrain]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..grains.len()).collect();
     let low = grains.iter().fold(Vector3::repeat(f64::INFINITY), |low, grain| low.inf(&grain.position));
     let high = grains.iter().fold(Vector3::repeat(f64::NEG_INFINITY), |high, grain| high.sup(&grain.position));
@@ -586,10 +586,10 @@ fn side_by_side(grains: &[NewGrain]) -> Vec<usize> {
     order
 }
 
-fn flight(grain: &NewGrain) -> Flight {
+pub(super) fn flight(grain: &NewGrain) -> Flight {
     Flight { position: grain.position, time: 0.0, velocity: grain.velocity, radius: grain.radius }
 }
 
-fn carried(grain: &NewGrain, id: u64) -> Grain {
+pub(super) fn carried(grain: &NewGrain, id: u64) -> Grain {
     Grain { id, mass: grain.mass(), spin: grain.spin, hits: 0, strength: grain.strength }
 }

@@ -1,0 +1,454 @@
+//! The grains of a time-stepped scheme, and everything about them that is no matter of how they are stepped.
+
+use impinge_events::{Domain, Flight, SurfaceContact};
+use nalgebra::Vector3;
+
+use super::books::Books;
+use super::neighbours::Neighbours;
+use crate::grains::{Grain, NewGrain, Snapshot};
+use crate::law::Body;
+use crate::near_field::Singular;
+use crate::scene::Interference;
+use crate::scheme::event_driven::{carried, flight, side_by_side};
+use crate::scheme::{Broken, Forces, GrainCollision, Laws, Observer, Passage, SurfaceHit};
+use crate::surface::{LARGEST_SLOPE, Surface};
+
+/// How far from the surface (in radii) a mesh is asked for its distance: farther, more of its index would be searched for nothing.
+const SIGHT: f64 = 10.0;
+
+/// The new slot of a grain that is gone.
+pub const GONE: u32 = u32::MAX;
+
+/// Two grains that are near each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Near {
+    /// Unit vector from the first to the second.
+    pub normal: Vector3<f64>,
+    /// Distance of their surfaces, m; negative where they overlap.
+    pub gap: f64,
+}
+
+/// All grains inside, with the surface, the laws, the domain and the forces.
+///
+/// A grain is known by its slot, its place in [`flights`](Self::flights) and [`grains`](Self::grains); slots stay what they are within a step.
+/// The flights are the state that a step works on: at its beginning they stand at [`time`](Self::time), and when it returns, at its end. Their
+/// `time` field is not used and stays 0.
+#[derive(Clone, Debug)]
+pub struct Crowd {
+    /// Positions, velocities and radii.
+    pub flights: Vec<Flight>,
+    /// What grains carry besides: masses, spins, hits.
+    pub grains: Vec<Grain>,
+    laws: Laws,
+    domain: Domain,
+    surface: Surface,
+    forces: Forces,
+    strengths: bool,
+    neighbours: Neighbours,
+    /// How far each grain is from the surface.
+    clear: Vec<Clear>,
+    /// Slots of the grains that are nearer to the surface than was asked.
+    at_surface: Vec<u32>,
+    /// Largest speed of a part of the surface, m/s.
+    surface_speed: f64,
+    /// Whether grains that have hit the surface pass through it from then on.
+    once_only: bool,
+    leaving: Vec<(u32, Passage)>,
+    start: f64,
+    /// Time since the start, s: it resolves a step where simulated time does not.
+    clock: f64,
+    entered: u64,
+    collisions: u64,
+    books: Books,
+    told: Books,
+}
+
+/// A grain is clear of the surface until it has moved so far.
+#[derive(Clone, Copy, Debug)]
+struct Clear {
+    /// Where it was, m.
+    from: Vector3<f64>,
+    /// When, s.
+    clock: f64,
+    /// How far it was from the surface, m.
+    gap: f64,
+    /// Whether it passes through the surface.
+    passes: bool,
+}
+
+const UNKNOWN: Clear = Clear { from: Vector3::new(0.0, 0.0, 0.0), clock: 0.0, gap: f64::NEG_INFINITY, passes: false };
+
+impl Crowd {
+    /// `grains` at simulated time `start` (s).
+    #[must_use]
+    pub fn new(grains: &[NewGrain], surface: Surface, domain: Domain, laws: Laws, forces: Forces, start: f64) -> Self {
+        // Neighbours in space are neighbours in memory.
+        let order = side_by_side(grains);
+        Self {
+            flights: order.iter().map(|&id| flight(&grains[id])).collect(),
+            grains: order.iter().map(|&id| carried(&grains[id], id as u64)).collect(),
+            laws,
+            domain,
+            surface_speed: impinge_events::Surface::speed(&surface) * 3f64.sqrt(),
+            surface,
+            forces,
+            strengths: grains.iter().any(|grain| grain.strength != 1.0),
+            neighbours: Neighbours::default(),
+            clear: vec![UNKNOWN; grains.len()],
+            at_surface: Vec::new(),
+            once_only: matches!(laws.interference, Interference::FirstOrder | Interference::RemovedOnFirstCollision),
+            leaving: Vec::new(),
+            start,
+            clock: 0.0,
+            entered: grains.len() as u64,
+            collisions: 0,
+            books: Books::default(),
+            told: Books::default(),
+        }
+    }
+
+    /// Simulated time at the beginning of the step, s.
+    #[must_use]
+    pub fn time(&self) -> f64 {
+        self.start + self.clock
+    }
+
+    /// How many grains are inside.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.flights.len()
+    }
+
+    /// Whether there is no grain.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.flights.is_empty()
+    }
+
+    /// The laws of contact.
+    #[must_use]
+    pub fn laws(&self) -> &Laws {
+        &self.laws
+    }
+
+    /// The region that is simulated.
+    #[must_use]
+    pub fn domain(&self) -> &Domain {
+        &self.domain
+    }
+
+    /// The surface, where it is at the beginning of the step.
+    #[must_use]
+    pub fn surface(&self) -> &Surface {
+        &self.surface
+    }
+
+    /// Collisions that were told, grain–grain and grain–surface.
+    #[must_use]
+    pub fn collisions(&self) -> u64 {
+        self.collisions
+    }
+
+    /// Whether a near field acts, so that accelerations depend on positions.
+    #[must_use]
+    pub fn has_near_field(&self) -> bool {
+        self.forces.near_field.is_some()
+    }
+
+    /// What a law needs to know of a grain as it is now.
+    #[must_use]
+    pub fn body(&self, slot: u32) -> Body {
+        let (flight, grain) = (&self.flights[slot as usize], &self.grains[slot as usize]);
+        Body { mass: grain.mass, radius: flight.radius, velocity: flight.velocity, spin: grain.spin }
+    }
+
+    /// Looks around from where [`flights`](Self::flights) are now, `after` seconds into the step: then [`pairs`](Self::pairs) and
+    /// [`at_surface`](Self::at_surface) name all that are nearer to each other than `reach` (m). Cheap as long as lists hold.
+    pub fn look(&mut self, after: f64, reach: f64) {
+        let now = self.clock + after;
+        let Self { flights, neighbours, domain, .. } = self;
+        if self.laws.interference != Interference::None {
+            let drifted = neighbours.drifted(now);
+            let holds = |(slot, flight): (usize, &Flight)| neighbours.holds(slot, flight.position, drifted, domain);
+            if !(neighbours.suits(flights.len(), reach) && flights.iter().enumerate().all(holds)) {
+                neighbours.make(flights, domain, now, reach, after);
+            }
+        }
+        self.look_for_surface(now, after, reach);
+    }
+
+    fn look_for_surface(&mut self, now: f64, after: f64, reach: f64) {
+        self.at_surface.clear();
+        if self.surface.elements() == 0 {
+            return;
+        }
+        let Self { flights, clear, surface, surface_speed, at_surface, .. } = self;
+        for ((slot, flight), clear) in (0..).zip(&*flights).zip(clear) {
+            let room = clear.gap - reach - *surface_speed * (now - clear.clock).abs();
+            let moved = (flight.position - clear.from).norm_squared();
+            if (room > 0.0 && moved < room * room) || clear.passes {
+                continue;
+            }
+            let gap = surface.gap(&Flight { time: after, ..*flight }, reach + SIGHT * flight.radius);
+            *clear = Clear { from: flight.position, clock: now, gap, ..*clear };
+            if gap < reach {
+                at_surface.push(slot);
+            }
+        }
+    }
+
+    /// Pairs of slots, the lower one first, each once: all that may be nearer to each other than asked of [`look`](Self::look), and others that
+    /// are near. None where grains pass through each other.
+    #[must_use]
+    pub fn pairs(&self) -> &[[u32; 2]] {
+        self.neighbours.pairs()
+    }
+
+    /// Slots of the grains that are nearer to the surface than asked of [`look`](Self::look), in ascending order. Grains that pass through the
+    /// surface are not among them.
+    #[must_use]
+    pub fn at_surface(&self) -> &[u32] {
+        &self.at_surface
+    }
+
+    /// How two grains stand to each other now; nothing where they are `reach` (m) or farther apart, or their centres coincide.
+    #[inline]
+    #[must_use]
+    pub fn near(&self, [a, b]: [u32; 2], reach: f64) -> Option<Near> {
+        let (a, b) = (&self.flights[a as usize], &self.flights[b as usize]);
+        let apart = self.domain.nearest(b.position - a.position);
+        let (squared, contact) = (apart.norm_squared(), a.radius + b.radius);
+        let most = contact + reach;
+        if squared < most * most && squared > 0.0 {
+            let distance = squared.sqrt();
+            return Some(Near { normal: apart / distance, gap: distance - contact });
+        }
+        None
+    }
+
+    /// Puts into `found` how a grain stands to the surface `after` seconds into the step, with the elements: each contact nearer than `reach` (m),
+    /// one a feature. The normals of a planar scene lie in its plane.
+    ///
+    /// # Errors
+    /// A surface that would push a grain of a planar scene out of its plane.
+    pub fn surface_contacts(
+        &self,
+        slot: u32,
+        after: f64,
+        reach: f64,
+        found: &mut Vec<(u32, SurfaceContact)>,
+    ) -> Result<(), Broken> {
+        found.clear();
+        let flight = Flight { time: after, ..self.flights[slot as usize] };
+        self.surface.contacts(&flight, reach, found);
+        if self.domain.planar {
+            for (_, contact) in found.iter_mut().filter(|(_, contact)| contact.normal.y != 0.0) {
+                if contact.normal.y.abs() > LARGEST_SLOPE {
+                    let grain = self.grains[slot as usize].id;
+                    return Err(Broken::OutOfPlane { time: self.time() + after, grain });
+                }
+                contact.normal = Vector3::new(contact.normal.x, 0.0, contact.normal.z).normalize();
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the first touch of two grains takes one of them out of the run, as `interference = "removed-on-first-collision"` has it: one that
+    /// has not hit the surface, touched by one that has. Then there is no contact, and the grain goes at the end of the step.
+    pub fn shields(&mut self, pair: [u32; 2]) -> bool {
+        if self.laws.interference != Interference::RemovedOnFirstCollision {
+            return false;
+        }
+        let is_fresh = |slot: u32| self.grains[slot as usize].hits == 0;
+        let [a, b] = pair;
+        if is_fresh(a) == is_fresh(b) {
+            return false;
+        }
+        self.leaving.push((if is_fresh(a) { a } else { b }, Passage::Removed));
+        true
+    }
+
+    /// Tells of a collision of the grains in these slots. The record may have them in any order; it is turned so that the lower id is the first.
+    pub fn tell_collision(&mut self, mut collision: GrainCollision, observer: &mut impl Observer) {
+        self.collisions += 1;
+        if collision.ids[0] > collision.ids[1] {
+            collision.ids.reverse();
+            collision.normal = -collision.normal;
+        }
+        observer.grain_collision(&collision);
+    }
+
+    /// Notes that the grain in `slot` hits the surface, and tells its hit order.
+    pub fn count_hit(&mut self, slot: u32) -> u32 {
+        let grain = &mut self.grains[slot as usize];
+        grain.hits += 1;
+        grain.hits
+    }
+
+    /// Tells of a hit of the grain in `slot`, which [`count_hit`](Self::count_hit) has noted. Where grains hit once, it passes through the surface
+    /// from now on.
+    pub fn tell_hit(&mut self, slot: u32, hit: &SurfaceHit, observer: &mut impl Observer) {
+        self.collisions += 1;
+        self.clear[slot as usize].passes = self.once_only;
+        observer.surface_hit(hit);
+    }
+
+    /// Writes the acceleration of each grain under gravity and near field, from where [`flights`](Self::flights) are now, to `pull` (m/s²).
+    ///
+    /// # Errors
+    /// Grains between which there is no finite force.
+    pub fn pull(&mut self, pull: &mut Vec<Vector3<f64>>) -> Result<(), Broken> {
+        let Self { forces, grains, flights, strengths, .. } = self;
+        forces.pull(grains, flights, *strengths, pull).map_err(|singular| self.singular(&singular))
+    }
+
+    /// Books that `pull` (m/s², from [`pull`](Self::pull)) has acted for `duration` (s) on grains that fly as they do now. A scheme does so for
+    /// all the momentum that forces give to its grains, or the ledger does not close.
+    pub fn book(&mut self, pull: &[Vector3<f64>], duration: f64) {
+        let gravity = self.forces.gravity;
+        if gravity != Vector3::zeros() {
+            let mass: f64 = self.grains.iter().map(|grain| grain.mass).sum();
+            self.books.impulse_gravity += gravity * (mass * duration);
+        }
+        if self.forces.near_field.is_some() {
+            for ((pull, grain), flight) in pull.iter().zip(&self.grains).zip(&self.flights) {
+                let impulse = (pull - gravity) * (grain.mass * duration);
+                self.books.impulse_near_field += impulse;
+                self.books.work_near_field += impulse.dot(&flight.velocity);
+            }
+        }
+    }
+
+    /// Whether forces act at all.
+    pub(super) fn has_forces(&self) -> bool {
+        self.forces.gravity != Vector3::zeros() || self.has_near_field()
+    }
+
+    /// Tells `observer` what forces did since it was last told.
+    pub(super) fn tell_forces(&mut self, observer: &mut impl Observer) -> Result<(), Broken> {
+        if !self.has_forces() {
+            return Ok(());
+        }
+        let Self { forces, flights, grains, .. } = self;
+        let potential = forces.near_field.as_mut().map(|near_field| {
+            let positions: Vec<_> = flights.iter().map(|flight| flight.position).collect();
+            let strengths: Vec<_> = grains.iter().map(|grain| grain.strength).collect();
+            near_field.potential_energy(&positions, Some(&strengths))
+        });
+        let potential = potential.transpose().map_err(|singular| self.singular(&singular))?;
+        let depths = self.flights.iter().zip(&self.grains).map(|(flight, grain)| self.depth(flight, grain));
+        self.books.depth = Some(depths.sum());
+        observer.kick(&self.books.since(&self.told, self.time(), potential));
+        self.told = self.books;
+        Ok(())
+    }
+
+    /// m g·x, J.
+    fn depth(&self, flight: &Flight, grain: &Grain) -> f64 {
+        grain.mass * flight.position.dot(&self.forces.gravity)
+    }
+
+    fn singular(&self, singular: &Singular) -> Broken {
+        let id = |slot: usize| self.grains[slot].id;
+        let grains = match *singular {
+            Singular::Coincident(a, b) => vec![id(a), id(b)],
+            Singular::NotFinite(grain) => vec![id(grain)],
+        };
+        Broken::Singular { time: self.time(), grains }
+    }
+
+    /// Time (s) from the beginning of the step until simulated time `end` (s).
+    pub(super) fn room(&self, end: f64) -> f64 {
+        end - self.start - self.clock
+    }
+
+    /// Goes on by a step of length `taken` (s), to the end of which the grains have been advanced. Where grains go, tells the new slots of all.
+    pub(super) fn end_step(&mut self, taken: f64) -> Result<Option<Vec<u32>>, Broken> {
+        impinge_events::Surface::start_epoch(&mut self.surface, taken);
+        self.clock += taken;
+        let Domain { min, max, periodic, .. } = self.domain;
+        for slot in 0..self.flights.len() {
+            let Flight { position, velocity, .. } = self.flights[slot];
+            // Not `<` and `>`: what is no number is not inside.
+            if (0..3).all(|axis| min[axis] <= position[axis] && position[axis] <= max[axis]) {
+                continue;
+            }
+            if !position.iter().chain(&velocity).all(|x| x.is_finite()) {
+                return Err(Broken::NotANumber { time: self.time(), grains: vec![self.grains[slot].id] });
+            }
+            if periodic {
+                self.wrap(slot);
+            } else {
+                self.leaving.push((slot as u32, Passage::Left));
+            }
+        }
+        Ok((!self.leaving.is_empty()).then(|| self.new_slots()))
+    }
+
+    fn new_slots(&self) -> Vec<u32> {
+        let mut slots = vec![0; self.flights.len()];
+        self.leaving.iter().for_each(|&(slot, _)| slots[slot as usize] = GONE);
+        (0..).zip(slots.iter_mut().filter(|slot| **slot != GONE)).for_each(|(new, slot)| *slot = new);
+        slots
+    }
+
+    fn wrap(&mut self, slot: usize) {
+        let before = self.depth(&self.flights[slot], &self.grains[slot]);
+        self.domain.wrap(&mut self.flights[slot].position);
+        self.books.carried_away += before - self.depth(&self.flights[slot], &self.grains[slot]);
+    }
+
+    /// Takes out the grains that go.
+    pub(super) fn take_out(&mut self, slots: &[u32], observer: &mut impl Observer) {
+        let mut leaving = std::mem::take(&mut self.leaving);
+        leaving.sort_by_key(|&(slot, _)| slot);
+        // One that was removed and left in the same step goes once.
+        leaving.dedup_by_key(|&mut (slot, _)| slot);
+        for (slot, passage) in leaving {
+            let (flight, grain) = (self.flights[slot as usize], self.grains[slot as usize]);
+            self.books.carried_away += self.depth(&flight, &grain);
+            observer.passage(passage, self.time(), &flight, &grain);
+        }
+        retain(&mut self.flights, slots);
+        retain(&mut self.grains, slots);
+        retain(&mut self.clear, slots);
+        self.neighbours.clear();
+    }
+
+    /// Takes a grain in now, in the last slot.
+    pub(super) fn enter(&mut self, new: &NewGrain, observer: &mut impl Observer) {
+        let (flight, grain) = (flight(new), carried(new, self.entered));
+        self.entered += 1;
+        self.strengths |= grain.strength != 1.0;
+        self.books.carried_away += -self.depth(&flight, &grain);
+        self.flights.push(flight);
+        self.grains.push(grain);
+        self.clear.push(UNKNOWN);
+        observer.passage(Passage::Entered, self.time(), &flight, &grain);
+    }
+
+    /// Whether a grain of this radius (m) at `position` (m) overlaps no other. The surface is not asked.
+    #[must_use]
+    pub fn is_free(&self, position: Vector3<f64>, radius: f64) -> bool {
+        self.laws.interference == Interference::None
+            || self
+                .flights
+                .iter()
+                .all(|flight| self.domain.nearest(flight.position - position).norm() >= flight.radius + radius)
+    }
+
+    /// Shows all grains as they are now.
+    pub fn snapshot<R>(&self, time: f64, look: impl FnOnce(&Snapshot<'_>) -> R) -> R {
+        let mut slots: Vec<usize> = (0..self.flights.len()).collect();
+        slots.sort_unstable_by_key(|&slot| self.grains[slot].id);
+        let flights: Vec<Flight> = slots.iter().map(|&slot| self.flights[slot]).collect();
+        let grains: Vec<Grain> = slots.iter().map(|&slot| self.grains[slot]).collect();
+        look(&Snapshot { time, flights: &flights, grains: &grains })
+    }
+}
+
+/// Keeps what has a slot.
+pub fn retain<T>(of: &mut Vec<T>, slots: &[u32]) {
+    let mut slots = slots.iter();
+    of.retain(|_| slots.next().is_some_and(|&slot| slot != GONE));
+}
