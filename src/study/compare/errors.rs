@@ -32,15 +32,8 @@ impl Distance {
             let position = domain.nearest(run.position - exact.position).norm();
             largest.max(Self { position, velocity: (run.velocity - exact.velocity).norm() })
         });
-        Self { position: largest.position / exact.radius, velocity: largest.velocity / speed_scale(exact) }
+        Self { position: largest.position / exact.radius, velocity: largest.velocity / exact.speed_scale() }
     }
-}
-
-/// Largest initial speed, or where all grains start at rest the largest final one, m/s.
-fn speed_scale(exact: &Measured) -> f64 {
-    let finally = || exact.ends.iter().flatten().map(|end| end.velocity.norm()).fold(0.0, f64::max);
-    let speed = if exact.speed > 0.0 { exact.speed } else { finally() };
-    if speed > 0.0 { speed } else { 1.0 }
 }
 
 /// Grains that are there in one run and not in the other, or are behind the surface in this one and not in the other.

@@ -4,6 +4,8 @@ use crate::scene::{Scene, Scheme, Substep};
 
 /// Sub-steps of the event-driven scheme over that of the scene, where forces act.
 const SUB_STEPS: [f64; 4] = [4.0, 2.0, 1.0, 0.5];
+/// Steps of the time-stepped schemes over the time in which the fastest grain flies a radius.
+const STEPS: [f64; 6] = [0.4, 0.2, 0.1, 0.05, 0.025, 0.0125];
 /// So many times finer than the finest sub-step of the ladder is that of the reference.
 pub(super) const REFERENCE_FINER: f64 = 8.0;
 
@@ -12,29 +14,28 @@ pub(super) const REFERENCE_FINER: f64 = 8.0;
 pub(super) struct Scales {
     /// Sub-step of the scene, s: given, or as its tolerance chooses it on average; none where no force acts.
     pub(super) sub_step: Option<f64>,
+    /// Time in which the fastest grain flies a radius, s.
+    pub(super) flight: f64,
 }
 
 /// A scheme and the one setting by which its accuracy is chosen.
 #[derive(Debug)]
 pub(super) struct Ladder {
     scheme: Scheme,
-    /// The scheme as the scene file calls it.
-    pub(super) name: &'static str,
     /// Key of the setting; empty where the scheme is exact and has none.
     pub(super) setting: &'static str,
     /// Unit of the setting; empty for a plain number.
     pub(super) unit: &'static str,
     /// Values from coarse to fine, so that each takes longer than the one before; none where this ladder says nothing of the scene.
     values: fn(&Scales) -> Vec<f64>,
-    /// Puts a value into a scene.
+    /// Puts a value into a scene of this scheme.
     set: fn(&mut Scene, f64),
 }
 
-/// All of them. A scheme with two settings may stand here twice.
-static LADDERS: [Ladder; 2] = [
+/// All of them. A scheme with two settings stands here twice; the other setting is then that of the scene, or its default.
+static LADDERS: [Ladder; 7] = [
     Ladder {
         scheme: Scheme::EventDriven,
-        name: "event-driven",
         setting: "",
         unit: "",
         values: |scales| if scales.sub_step.is_none() { vec![0.0] } else { Vec::new() },
@@ -42,13 +43,51 @@ static LADDERS: [Ladder; 2] = [
     },
     Ladder {
         scheme: Scheme::EventDriven,
-        name: "event-driven",
         setting: "substep",
         unit: "s",
         values: |scales| scales.sub_step.map_or_else(Vec::new, |step| SUB_STEPS.map(|times| times * step).to_vec()),
         set: set_sub_step,
     },
+    Ladder {
+        scheme: Scheme::FixedPoint,
+        setting: "tolerance",
+        unit: "",
+        values: |_| vec![1e-3, 1e-4, 1e-5, 1e-6, 1e-7],
+        set: |scene, value| scene.fixed_point.get_or_insert_default().tolerance = value,
+    },
+    Ladder {
+        scheme: Scheme::FixedPoint,
+        setting: "largest_step",
+        unit: "s",
+        values: steps,
+        set: |scene, value| scene.fixed_point.get_or_insert_default().largest_step = Some(value),
+    },
+    Ladder {
+        scheme: Scheme::Trapezoidal,
+        setting: "step",
+        unit: "s",
+        values: steps,
+        set: |scene, value| scene.trapezoidal.get_or_insert_default().step = Some(value),
+    },
+    Ladder {
+        scheme: Scheme::SoftSphere,
+        setting: "young_modulus",
+        unit: "Pa",
+        values: |_| vec![1e8, 1e9, 1e10, 1e11, 1e12],
+        set: |scene, value| scene.soft_sphere.get_or_insert_default().young_modulus = value,
+    },
+    Ladder {
+        scheme: Scheme::SoftSphere,
+        setting: "step_fraction",
+        unit: "",
+        values: |_| vec![0.16, 0.08, 0.04, 0.02, 0.01],
+        set: |scene, value| scene.soft_sphere.get_or_insert_default().step_fraction = value,
+    },
 ];
+
+fn steps(scales: &Scales) -> Vec<f64> {
+    STEPS.map(|times| times * scales.flight).to_vec()
+}
 
 /// One run to be made.
 #[derive(Clone, Debug)]
@@ -61,21 +100,26 @@ pub(super) struct Rung {
 
 /// The schemes that can be compared, as the scene file calls them.
 pub fn scheme_names() -> impl Iterator<Item = &'static str> {
-    let repeated = |place: usize| LADDERS[..place].iter().any(|earlier| earlier.name == LADDERS[place].name);
-    (0..LADDERS.len()).filter(move |&place| !repeated(place)).map(|place| LADDERS[place].name)
+    let first = |place: &usize| LADDERS[..*place].iter().all(|earlier| earlier.scheme != LADDERS[*place].scheme);
+    (0..LADDERS.len()).filter(first).map(|place| LADDERS[place].scheme.name())
 }
 
 /// The ladders of the named schemes, or of all where none is named.
 pub(super) fn ladders(names: &[String]) -> impl Iterator<Item = &'static Ladder> {
-    LADDERS.iter().filter(move |ladder| names.is_empty() || names.iter().any(|name| name == ladder.name))
+    LADDERS.iter().filter(move |ladder| names.is_empty() || names.iter().any(|name| name == ladder.name()))
 }
 
 impl Ladder {
+    /// The scheme as the scene file calls it.
+    pub(super) fn name(&self) -> &'static str {
+        self.scheme.name()
+    }
+
     /// What a run of it is called.
     pub(super) fn label(&self, value: Option<f64>) -> String {
         match value {
-            Some(value) => format!("{}, {} {value:e} {}", self.name, self.setting, self.unit).trim_end().to_owned(),
-            None => self.name.to_owned(),
+            Some(value) => format!("{}, {} {value:.2e} {}", self.name(), self.setting, self.unit).trim_end().to_owned(),
+            None => self.name().to_owned(),
         }
     }
 
@@ -83,8 +127,7 @@ impl Ladder {
     pub(super) fn rungs(&self, scene: &Scene, scales: &Scales, quick: bool) -> Vec<Rung> {
         let every = if quick { 2 } else { 1 };
         let rung = |value| {
-            let mut scene =
-                Scene { run: crate::scene::Run { scheme: self.scheme, ..scene.run.clone() }, ..scene.clone() };
+            let mut scene = with_scheme(scene, self.scheme);
             (self.set)(&mut scene, value);
             Rung { value: (!self.setting.is_empty()).then_some(value), scene }
         };
@@ -94,17 +137,32 @@ impl Ladder {
 
 /// The scene with the event-driven scheme, and a sub-step (s) where forces act.
 pub(super) fn event_driven(scene: &Scene, sub_step: Option<f64>) -> Scene {
-    let mut scene = scene.clone();
-    scene.run.scheme = Scheme::EventDriven;
+    let mut scene = with_scheme(scene, Scheme::EventDriven);
     if let Some(step) = sub_step {
         set_sub_step(&mut scene, step);
     }
     scene
 }
 
-/// The finest sub-step of the ladder, s.
-pub(super) fn finest_sub_step(scales: &Scales) -> Option<f64> {
-    scales.sub_step.map(|step| SUB_STEPS[SUB_STEPS.len() - 1] * step)
+/// The scene with another scheme, and without the keys that belong to the others.
+fn with_scheme(scene: &Scene, scheme: Scheme) -> Scene {
+    let mut scene = scene.clone();
+    scene.run.scheme = scheme;
+    scene.fixed_point = scene.fixed_point.filter(|_| scheme == Scheme::FixedPoint);
+    scene.trapezoidal = scene.trapezoidal.filter(|_| scheme == Scheme::Trapezoidal);
+    scene.soft_sphere = scene.soft_sphere.filter(|_| scheme == Scheme::SoftSphere);
+    if scheme != Scheme::EventDriven {
+        scene.run.substep = None;
+        if let Some(near_field) = &mut scene.near_field {
+            (near_field.substep, near_field.tolerance) = (None, None);
+        }
+    }
+    scene
+}
+
+/// The finest sub-step of the ladder for a scene of this sub-step, s.
+pub(super) fn finest_sub_step(scene_step: f64) -> f64 {
+    SUB_STEPS[SUB_STEPS.len() - 1] * scene_step
 }
 
 fn set_sub_step(scene: &mut Scene, step: f64) {
@@ -121,7 +179,9 @@ fn set_sub_step(scene: &mut Scene, step: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Overrides, SceneFile, check};
+    use crate::scene::{Overrides, SceneFile, SoftSphere, check};
+
+    const SCALES: Scales = Scales { sub_step: Some(4e-6), flight: 1e-4 };
 
     fn scene(set: &[&str]) -> Scene {
         let overrides = Overrides { set: set.iter().map(|text| (*text).to_owned()).collect(), ..Overrides::default() };
@@ -133,37 +193,45 @@ mod tests {
     fn without_forces_the_event_driven_scheme_is_one_exact_run() {
         let mut free = scene(&[]);
         free.near_field = None;
-        let runs: Vec<_> = ladders(&["event-driven".into()])
-            .flat_map(|ladder| ladder.rungs(&free, &Scales { sub_step: None }, false))
-            .collect();
-        assert_eq!(runs.len(), 1);
-        assert_eq!((runs[0].value, &runs[0].scene), (None, &free));
+        let scales = Scales { sub_step: None, ..SCALES };
+        let rungs = ladders(&["event-driven".into()]).flat_map(|ladder| ladder.rungs(&free, &scales, false));
+        let rungs: Vec<_> = rungs.map(|rung| (rung.value, rung.scene)).collect();
+        assert_eq!(rungs, [(None, free.clone())]);
     }
 
     #[test]
-    fn with_forces_its_sub_steps_are_halved_and_every_scene_is_valid() {
-        let gravity = "run.gravity=[0, 0, -9.81]";
-        let mut falling = scene(&[gravity]);
+    fn with_forces_its_sub_steps_are_halved() {
+        let mut falling = scene(&["run.gravity=[0, 0, -9.81]"]);
         falling.near_field = None;
         let chosen = scene(&["near_field.substep=auto", "near_field.tolerance=1e-5"]);
-        for scene in [falling, scene(&[gravity]), chosen] {
-            let scales = Scales { sub_step: Some(4e-6) };
-            let rungs: Vec<_> = ladders(&[]).flat_map(|ladder| ladder.rungs(&scene, &scales, false)).collect();
-            let values: Vec<_> = rungs.iter().filter_map(|rung| rung.value).collect();
-            assert_eq!(values, [16e-6, 8e-6, 4e-6, 2e-6]);
-            for rung in rungs {
-                assert_eq!(check(&rung.scene), Ok(()));
-                assert_eq!(rung.scene.substep(), Substep::Fixed(rung.value.expect("it has one")));
+        for scene in [falling, scene(&[]), chosen] {
+            let rungs = ladders(&["event-driven".into()]).flat_map(|ladder| ladder.rungs(&scene, &SCALES, false));
+            let steps: Vec<_> = rungs.map(|rung| (rung.value, rung.scene.substep())).collect();
+            assert_eq!(steps, [16e-6, 8e-6, 4e-6, 2e-6].map(|step| (Some(step), Substep::Fixed(step))));
+        }
+    }
+
+    #[test]
+    fn every_setting_of_every_scheme_is_one_that_a_scene_may_have() {
+        let mut soft = scene(&[]);
+        soft.near_field = None;
+        soft.run.scheme = Scheme::SoftSphere;
+        soft.soft_sphere = Some(SoftSphere { poisson_ratio: 0.2, ..SoftSphere::default() });
+        for scene in [scene(&[]), soft] {
+            for ladder in ladders(&[]) {
+                for rung in ladder.rungs(&scene, &SCALES, false) {
+                    assert_eq!(check(&rung.scene), Ok(()), "{}", ladder.label(rung.value));
+                    let kept = rung.scene.soft_sphere.is_none_or(|table| {
+                        table.poisson_ratio == scene.soft_sphere.map_or(0.3, |own| own.poisson_ratio)
+                    });
+                    assert!(kept, "what the scene says beside the setting stays");
+                }
             }
         }
     }
 
     #[test]
     fn each_scheme_is_named_once() {
-        let names: Vec<_> = scheme_names().collect();
-        let mut once = names.clone();
-        once.dedup();
-        assert_eq!(names, once);
-        assert!(names.contains(&"event-driven"));
+        assert_eq!(scheme_names().collect::<Vec<_>>(), ["event-driven", "fixed-point", "trapezoidal", "soft-sphere"]);
     }
 }

@@ -144,6 +144,13 @@ impl Measured {
         }
         measured
     }
+
+    /// Largest initial speed; where all grains start at rest the largest final one, m/s. Above 0.
+    pub(super) fn speed_scale(&self) -> f64 {
+        let finally = || self.ends.iter().flatten().map(|end| end.velocity.norm()).fold(0.0, f64::max);
+        let speed = if self.speed > 0.0 { self.speed } else { finally() };
+        if speed > 0.0 { speed } else { 1.0 }
+    }
 }
 
 /// Keeps where grains are at the end and where they left: id, time (s) and flight.

@@ -174,7 +174,7 @@ impl Plan {
                 let what = ladder.label(rung.value);
                 entries.push(Entry::make(self, runner, &reference, &rung, &what, entries.last()));
             }
-            curves.push(Curve { scheme: ladder.name, setting: ladder.setting, unit: ladder.unit, entries });
+            curves.push(Curve { scheme: ladder.name(), setting: ladder.setting, unit: ladder.unit, entries });
         }
         let interrupted =
             curves.iter().flat_map(|curve| &curve.entries).any(|entry| entry.result == Err(Fault::Interrupted));

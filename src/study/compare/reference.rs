@@ -60,8 +60,8 @@ pub struct Reference {
 impl Reference {
     /// Finds the right answer of a planned scene.
     pub(super) fn find(plan: &Plan, runner: &mut Runner<'_>) -> Result<Self, Failed> {
-        let scales = Scales { sub_step: sub_step(plan, runner)? };
-        let sub_step = ladder::finest_sub_step(&scales);
+        let scene_step = sub_step(plan, runner)?;
+        let sub_step = scene_step.map(ladder::finest_sub_step);
         // Chaos is the same with any sub-step: the finest of the ladder shows it as well as that of the reference.
         let scene = ladder::event_driven(&plan.scene, sub_step);
         let base = runner.must(plan, &scene, None, "event-driven run")?;
@@ -70,6 +70,7 @@ impl Reference {
         })?;
         let spread = probes.iter().map(|probe| probe.0).fold(Distance::default(), Distance::max);
         let members: Vec<_> = probes.into_iter().map(|probe| probe.1).collect();
+        let scales = Scales { sub_step: scene_step, flight: base.radius / base.speed_scale() };
         let found = Self {
             regime: Regime::Pointwise,
             spread,
