@@ -10,16 +10,14 @@ use super::plots::speed_against_error;
 use super::summary::{brief, grouped, quantity};
 use super::tables::table;
 use super::{Error, Folder};
-use crate::study::compare::{
-    Comparison, Curve, DEVIATIONS, Entry, Level, PROBE, QUANTITIES, Regime, Scores, Statistics,
-};
+use crate::study::compare::{Comparison, Curve, Entry, Fault, Level, PROBE, QUANTITIES, Regime, Scores, Statistics};
 
 /// Widest line of the text, characters.
 const WIDTH: usize = 100;
 /// Characters for the name of a scheme or setting.
-const NAME: usize = 26;
+const NAME: usize = 14;
 /// Characters for each number beside it.
-const COLUMN: usize = 10;
+const COLUMN: usize = 9;
 /// Errors at which the text says who is how fast.
 const LEVELS_TOLD: usize = 3;
 
@@ -164,9 +162,11 @@ pub fn comparison_text(comparison: &Comparison) -> String {
         comparison.seed
     );
     text.push_str(&heading);
+    text.push('\n');
     paragraph(&mut text, &regime(comparison));
     text.push('\n');
     write_table(&mut text, comparison);
+    paragraph(&mut text, legend(comparison.reference.regime));
     text.push('\n');
     verdict(comparison).iter().for_each(|sentence| paragraph(&mut text, sentence));
     text
@@ -175,26 +175,27 @@ pub fn comparison_text(comparison: &Comparison) -> String {
 /// What the error is, and what is below it.
 fn regime(comparison: &Comparison) -> String {
     let reference = &comparison.reference;
-    let probe = format!("Starts that differ by {PROBE:e} radii end {:.1e} radii apart", reference.spread.position);
+    let spread = reference.spread.position;
+    let probe = format!("Starts that differ by {PROBE:e} radii end {spread:.1e} radii apart");
     match reference.regime {
         Regime::Pointwise => {
-            let finer =
-                reference.sub_step.map_or_else(String::new, |step| format!(" of sub-steps of {}", brief(step, "s")));
+            let finer = reference.sub_step.map(|step| format!(" with sub-steps of {}", brief(step, "s")));
             format!(
-                "{probe}: no chaos before the end. The error is that of the grain which is furthest off, against the event-driven scheme{finer}; \
-                 below {:.1e} radii it means nothing.",
+                "{probe}: no chaos before the end. The error is that of the grain which is furthest off, in radii, against the \
+                 event-driven scheme{}; below {:.1e} it means nothing (marked ~).",
+                finer.unwrap_or_default(),
                 reference.floor.position
             )
         }
-        Regime::Statistical => {
-            let floor = reference_floor(comparison);
-            format!(
-                "{probe}: chaos, and no grain can be told from its neighbour. The error is the root mean square over energies, impulse and counts, \
-                 against the means of {} event-driven runs from starts {:e} radii apart; below {floor} a difference means nothing (marked ~).",
-                reference.members.len(),
-                reference.displacement,
-            )
-        }
+        Regime::Statistical => format!(
+            "{probe}: errors grow so much ({:.0e} times) that the end of a single grain says nothing of a scheme. The error is the root mean \
+             square over energies, impulse and counts, against the means of {} event-driven runs from starts that differ by {:e} radii; \
+             below {} a difference means nothing (marked ~).",
+            spread / PROBE,
+            reference.members.len(),
+            reference.displacement,
+            reference_floor(comparison),
+        ),
     }
 }
 
@@ -213,10 +214,10 @@ const FOR_GRAINS: [Column; 2] = [
 ];
 const FOR_MEANS: [Column; 5] = [
     ("error", |scores| marked(scores.is_noise(), &percent(scores.error))),
-    ("first hits", |scores| deviation(scores, 0)),
+    ("1st hits", |scores| deviation(scores, 0)),
     ("all hits", |scores| deviation(scores, 1)),
     ("final E", |scores| deviation(scores, 3)),
-    ("collisions", |scores| deviation(scores, 4)),
+    ("pairs", |scores| deviation(scores, 4)),
 ];
 const FOR_ALL: [Column; 3] = [
     ("overlap", |scores| small(scores.overlap)),
@@ -224,43 +225,57 @@ const FOR_ALL: [Column; 3] = [
     ("residual", |scores| small(scores.energy_residual)),
 ];
 
+/// What the headings mean.
+fn legend(regime: Regime) -> &'static str {
+    match regime {
+        Regime::Pointwise => {
+            "velocity: largest error over the largest initial speed; overlap: deepest, in radii; lost: grains that went through the surface or \
+             are missing; residual: energy that is not accounted for (below 0: made) over that of the run"
+        }
+        Regime::Statistical => {
+            "1st hits, all hits: energy to the surface; final E: kinetic energy at the end; pairs: grain–grain collisions; overlap: deepest, in \
+             radii; lost: grains that went through the surface or are missing; residual: energy that is not accounted for (below 0: made) over \
+             that of the run"
+        }
+    }
+}
+
 fn write_table(text: &mut String, comparison: &Comparison) {
     let columns: Vec<Column> = match comparison.reference.regime {
         Regime::Pointwise => FOR_GRAINS.into_iter().chain(FOR_ALL).collect(),
         Regime::Statistical => FOR_MEANS.into_iter().chain(FOR_ALL).collect(),
     };
-    let cells =
-        |cells: &mut dyn Iterator<Item = String>| cells.map(|cell| format!("{cell:>COLUMN$}")).collect::<String>();
-    let heading = cells(&mut ["CPU time"].into_iter().chain(columns.iter().map(|column| column.0)).map(str::to_owned));
-    line(text, &format!("{:NAME$}{heading}", "scheme"));
+    let row = |name: &str, cells: &mut dyn Iterator<Item = String>| {
+        cells.fold(format!("{name:NAME$}"), |row, cell| format!("{row}{cell:>COLUMN$}")) + "\n"
+    };
+    let headings = ["CPU time"].into_iter().chain(columns.iter().map(|column| column.0));
+    text.push_str(&row("", &mut headings.map(str::to_owned)));
     for curve in &comparison.curves {
         if !curve.setting.is_empty() {
-            line(text, curve.scheme);
+            let unit = if curve.unit.is_empty() { String::new() } else { format!(" ({})", curve.unit) };
+            let _ = writeln!(text, "{}, {}{unit}", curve.scheme, curve.setting);
+        }
+        if let Some(fault) = refused(curve) {
+            let _ = writeln!(text, "  {fault}");
+            continue;
         }
         for entry in &curve.entries {
-            let name = match entry.value {
-                Some(value) => {
-                    format!("  {} {value:.3e}", curve.setting)
-                        + if curve.unit.is_empty() { "" } else { " " }
-                        + curve.unit
-                }
-                None => curve.scheme.to_owned(),
-            };
+            let name = entry.value.map_or_else(|| curve.scheme.to_owned(), |value| format!("  {value:e}"));
             let cpu = entry.cpu_seconds.map_or_else(|| "-".to_owned(), |seconds| quantity(seconds, "s"));
-            match &entry.result {
-                Ok(scores) => {
-                    let numbers = cells(&mut [cpu].into_iter().chain(columns.iter().map(|column| column.1(scores))));
-                    line(text, &format!("{name:NAME$}{numbers}"));
-                }
-                Err(fault) => line(text, &format!("{name:NAME$}{cpu:>COLUMN$}  {fault}")),
+            let numbers = entry.result.as_ref().map(|scores| columns.iter().map(|column| column.1(scores)));
+            match numbers {
+                Ok(numbers) => text.push_str(&row(&name, &mut [cpu].into_iter().chain(numbers))),
+                Err(fault) => _ = writeln!(text, "{name:NAME$}{cpu:>COLUMN$}  {fault}"),
             }
         }
     }
 }
 
-fn line(text: &mut String, line: &str) {
-    text.push_str(line.trim_end());
-    text.push('\n');
+/// Why a scheme cannot run the scene, whatever its setting.
+fn refused(curve: &Curve) -> Option<&Fault> {
+    let mut faults = curve.entries.iter().map(|entry| entry.result.as_ref().err());
+    let first = faults.next()?.filter(|fault| matches!(fault, Fault::Refused(_)))?;
+    faults.all(|fault| fault == Some(first)).then_some(first)
 }
 
 /// Who is how fast, at what order errors fall, and what went wrong.
@@ -269,24 +284,24 @@ fn verdict(comparison: &Comparison) -> Vec<String> {
     // The best errors are the hardest to get.
     let told = levels.len().saturating_sub(LEVELS_TOLD);
     let mut sentences: Vec<String> = levels[told..].iter().map(|level| at_level(comparison, level)).collect();
-    if comparison.curves.iter().flat_map(Curve::done).count() > 0 && levels.is_empty() {
+    let ended = comparison.curves.iter().filter(|curve| curve.done().next().is_some()).count();
+    if ended > 1 && levels.is_empty() {
         sentences.push("No two schemes reach the same error, so their speeds cannot be compared.".to_owned());
     }
     let orders = comparison.curves.iter().filter_map(|curve| {
         let order = curve.order()?;
-        Some(format!("{} {order:.2} in {}", curve.scheme, curve.setting))
+        Some(format!("{} as {}^{order:.2}", curve.scheme, curve.setting))
     });
     let orders: Vec<_> = orders.collect();
     if !orders.is_empty() {
-        sentences.push(format!("Observed order: {}.", orders.join(", ")));
+        sentences.push(format!("Between the two finest settings above the floor errors go {}.", orders.join(", ")));
     }
-    let noise = comparison.curves.iter().filter(|curve| curve.done().any(|(_, scores)| scores.is_noise()));
-    let noise: Vec<_> = noise.map(|curve| curve.scheme).collect();
-    if comparison.reference.regime == Regime::Statistical && !noise.is_empty() {
-        sentences.push(format!(
-            "Not to be told from the event-driven scheme by these means ({DEVIATIONS} standard deviations): {}.",
-            noise.join(", ")
-        ));
+    // What is exact shows the noise itself.
+    let noise = comparison.curves.iter().filter(|curve| !curve.setting.is_empty());
+    let noise: Vec<_> =
+        noise.filter(|curve| curve.done().any(|(_, scores)| scores.is_noise())).map(Curve::name).collect();
+    if !noise.is_empty() {
+        sentences.push(format!("At their best not to be told from the right answer: {}.", noise.join("; ")));
     }
     if comparison.interrupted {
         sentences.push("The comparison was interrupted.".to_owned());
@@ -295,7 +310,7 @@ fn verdict(comparison: &Comparison) -> Vec<String> {
 }
 
 fn at_level(comparison: &Comparison, level: &Level) -> String {
-    let name = |curve: usize| comparison.curves[curve].scheme;
+    let name = |curve: usize| comparison.curves[curve].name();
     let (fastest, seconds) = level.costs[0];
     let mut sentence = format!("At an error of {:e}: {} {}", level.error, name(fastest), quantity(seconds, "s"));
     for &(curve, cost) in &level.costs[1..] {
@@ -332,8 +347,11 @@ fn small(value: f64) -> String {
 /// A part in per cent, to two digits.
 fn percent(value: f64) -> String {
     let parts = 100.0 * value;
-    let digits = if parts == 0.0 { 0 } else { (1 - parts.abs().log10().floor() as i32).clamp(0, 3) as usize };
-    format!("{parts:.digits$} %")
+    match parts.abs() {
+        0.0 => "0 %".to_owned(),
+        size if size < 0.01 => format!("{parts:.0e} %"),
+        size => format!("{parts:.*} %", (1 - size.log10().floor() as i32).clamp(0, 3) as usize),
+    }
 }
 
 fn deviation(scores: &Scores, quantity: usize) -> String {
@@ -343,5 +361,87 @@ fn deviation(scores: &Scores, quantity: usize) -> String {
 }
 
 fn marked(noise: bool, text: &str) -> String {
-    if noise { format!("~{text}") } else { text.to_owned() }
+    if noise && !text.starts_with('0') { format!("~{text}") } else { text.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::compare::fake::{FLOOR, comparison};
+
+    fn rows(write: impl FnOnce(&mut Vec<u8>) -> io::Result<()>) -> Vec<std::collections::HashMap<String, String>> {
+        let mut bytes = Vec::new();
+        write(&mut bytes).unwrap();
+        csv::Reader::from_reader(bytes.as_slice()).deserialize().map(Result::unwrap).collect()
+    }
+
+    #[test]
+    fn every_run_is_a_row_and_what_failed_says_why() {
+        for regime in [Regime::Pointwise, Regime::Statistical] {
+            let rows = rows(|out| write_runs(out, &comparison(regime)));
+            assert_eq!(rows.len(), 1 + 4 + 5 + 2);
+            let step = &rows[2];
+            assert_eq!([&step["scheme"], &step["setting"], &step["value"]], ["trapezoidal", "step", "0.1"]);
+            assert_eq!([&step["cpu_seconds"], &step["error"], &step["status"]], ["0.01", "0.1", "done"]);
+            assert_eq!([&step["energy_all_hits_error"], &step["energy_all_hits_floor"]], ["0.05", "0.002"]);
+            assert_eq!(step["position_error"].is_empty(), regime == Regime::Statistical);
+            let slow = &rows[8];
+            assert_eq!((slow["error"].as_str(), slow["lost"].as_str()), ("", ""));
+            assert_eq!(slow["status"], "stopped at t = 3.000e-2 s after 60 s of processor time");
+        }
+    }
+
+    #[test]
+    fn the_ensemble_has_means_deviations_and_standard_errors() {
+        let rows = rows(|out| write_ensemble(out, &comparison(Regime::Statistical)));
+        assert_eq!(rows.len(), QUANTITIES.len());
+        let number = |name: &str| rows[1][name].parse::<f64>().unwrap();
+        assert_eq!((rows[1]["quantity"].as_str(), number("mean"), number("members")), ("energy_all_hits", 1.1, 2.0));
+        approx::assert_relative_eq!(number("standard_deviation"), 0.02_f64.sqrt(), max_relative = 1e-14);
+        approx::assert_relative_eq!(number("standard_error"), 0.1, max_relative = 1e-14);
+    }
+
+    #[test]
+    fn the_text_fits_a_terminal_and_says_who_is_faster() {
+        for regime in [Regime::Pointwise, Regime::Statistical] {
+            let text = comparison_text(&comparison(regime));
+            let table_or_words = |line: &&str| !line.contains("stopped at") && !line.contains("refused");
+            assert!(text.lines().filter(table_or_words).all(|line| line.chars().count() <= WIDTH), "{text}");
+            let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
+            for part in [
+                "At an error of 1e-2: event-driven 10.00 ms, trapezoidal (step) 10 times that, soft-sphere (young_modulus) does not get there",
+                "trapezoidal (step) as step^1.00",
+                "refused: run.scheme: it cannot do this",
+            ] {
+                assert!(words.contains(part), "without {part:?}:\n{text}");
+            }
+            assert_eq!(words.matches("it cannot do this").count(), 1, "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_below_the_floor_is_marked() {
+        let scores = |error: f64| Scores {
+            error,
+            floor: FLOOR,
+            distance: None,
+            deviations: [error; 7],
+            floors: [FLOOR; 7],
+            overlap: 0.0,
+            lost: 0,
+            energy_residual: 0.0,
+        };
+        let shown = [0.5 * FLOOR, -0.22, 1e-7, 0.0].map(|error| deviation(&scores(error), 0));
+        assert_eq!(shown, ["~+0.10 %", "-22 %", "~+1e-5 %", "0 %"]);
+    }
+
+    #[test]
+    fn the_summary_names_regime_orders_and_levels() {
+        let json = summary(&comparison(Regime::Statistical));
+        assert_eq!(json["reference"]["regime"], "statistical");
+        assert_eq!(json["reference"]["quantities"]["grain_grain"]["mean"], 1.1);
+        assert_eq!(json["curves"][2]["failed"], 2);
+        assert_eq!(json["levels"][0]["fastest_first"][0]["scheme"], "event-driven");
+        assert!(json["curves"][0]["observed_order"].is_null());
+    }
 }

@@ -131,12 +131,7 @@ fn draw_key(area: &Area<'_>, drawings: &[Drawing<'_>]) -> Drawn {
         let Drawing { curve, colour, .. } = drawing;
         let line = [(KEY * FINE, y * FINE), ((KEY + 22) * FINE, y * FINE)];
         area.draw(&PathElement::new(line, colour.stroke_width(fine(3))))?;
-        let name = if curve.setting.is_empty() {
-            curve.scheme.to_owned()
-        } else {
-            format!("{}: {}", curve.scheme, curve.setting)
-        };
-        write(area, &name, [KEY + 30, y], 13, INK, (HPos::Left, VPos::Center))?;
+        write(area, &curve.name(), [KEY + 30, y], 13, INK, (HPos::Left, VPos::Center))?;
         let best = curve.done().min_by(|a, b| a.1.error.total_cmp(&b.1.error));
         let best = best.and_then(|(entry, scores)| Some((scores, entry.cpu_seconds?)));
         let best = best.map_or_else(
@@ -158,4 +153,47 @@ fn draw_key(area: &Area<'_>, drawings: &[Drawing<'_>]) -> Drawn {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::compare::fake::comparison;
+
+    #[test]
+    fn every_scheme_has_its_curve_and_the_floor_is_drawn() {
+        for regime in [Regime::Pointwise, Regime::Statistical] {
+            let svg = speed_against_error(&comparison(regime)).unwrap().expect("there are points");
+            // Two circles a point, filled and its rim: one exact run, four steps, three of five moduli.
+            assert_eq!(svg.matches("<circle").count(), 2 * (1 + 4 + 3));
+            for part in [
+                "trapezoidal (step)",
+                "2 of 5 runs failed",
+                "no run came to its end",
+                "floor: below it",
+                "5.0e-3 in 200.0 ms",
+            ] {
+                assert!(svg.contains(part), "without {part:?}");
+            }
+            assert!(!svg.contains("NaN") && !svg.contains("inf"));
+        }
+    }
+
+    #[test]
+    #[ignore = "writes a picture to look at, where PICTURE says"]
+    fn a_picture_to_look_at() {
+        let svg = speed_against_error(&comparison(Regime::Statistical)).unwrap().unwrap();
+        std::fs::write(
+            std::env::var("PICTURE").unwrap(),
+            svg + &crate::output::comparison_text(&comparison(Regime::Pointwise)),
+        )
+        .unwrap();
+    }
+
+    #[test]
+    fn there_is_no_picture_where_no_run_came_to_its_end() {
+        let mut none = comparison(Regime::Statistical);
+        none.curves.drain(..3);
+        assert_eq!(speed_against_error(&none).unwrap(), None);
+    }
 }

@@ -45,7 +45,9 @@ static LADDERS: [Ladder; 7] = [
         scheme: Scheme::EventDriven,
         setting: "substep",
         unit: "s",
-        values: |scales| scales.sub_step.map_or_else(Vec::new, |step| SUB_STEPS.map(|times| times * step).to_vec()),
+        values: |scales| {
+            scales.sub_step.map_or_else(Vec::new, |step| SUB_STEPS.map(|times| rounded(times * step)).to_vec())
+        },
         set: set_sub_step,
     },
     Ladder {
@@ -86,7 +88,12 @@ static LADDERS: [Ladder; 7] = [
 ];
 
 fn steps(scales: &Scales) -> Vec<f64> {
-    STEPS.map(|times| times * scales.flight).to_vec()
+    STEPS.map(|times| rounded(times * scales.flight)).to_vec()
+}
+
+/// To three digits: nobody wants to read more of a setting.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.2e}").parse().unwrap_or(value)
 }
 
 /// One run to be made.
@@ -118,7 +125,7 @@ impl Ladder {
     /// What a run of it is called.
     pub(super) fn label(&self, value: Option<f64>) -> String {
         match value {
-            Some(value) => format!("{}, {} {value:.2e} {}", self.name(), self.setting, self.unit).trim_end().to_owned(),
+            Some(value) => format!("{}, {} {value:e} {}", self.name(), self.setting, self.unit).trim_end().to_owned(),
             None => self.name().to_owned(),
         }
     }
@@ -162,7 +169,7 @@ fn with_scheme(scene: &Scene, scheme: Scheme) -> Scene {
 
 /// The finest sub-step of the ladder for a scene of this sub-step, s.
 pub(super) fn finest_sub_step(scene_step: f64) -> f64 {
-    SUB_STEPS[SUB_STEPS.len() - 1] * scene_step
+    rounded(SUB_STEPS[SUB_STEPS.len() - 1] * scene_step)
 }
 
 fn set_sub_step(scene: &mut Scene, step: f64) {
@@ -193,19 +200,20 @@ mod tests {
     fn without_forces_the_event_driven_scheme_is_one_exact_run() {
         let mut free = scene(&[]);
         free.near_field = None;
-        let scales = Scales { sub_step: None, ..SCALES };
-        let rungs = ladders(&["event-driven".into()]).flat_map(|ladder| ladder.rungs(&free, &scales, false));
+        let (scales, names) = (Scales { sub_step: None, ..SCALES }, ["event-driven".to_owned()]);
+        let rungs = ladders(&names).flat_map(|ladder| ladder.rungs(&free, &scales, false));
         let rungs: Vec<_> = rungs.map(|rung| (rung.value, rung.scene)).collect();
         assert_eq!(rungs, [(None, free.clone())]);
     }
 
     #[test]
     fn with_forces_its_sub_steps_are_halved() {
+        let names = ["event-driven".to_owned()];
         let mut falling = scene(&["run.gravity=[0, 0, -9.81]"]);
         falling.near_field = None;
         let chosen = scene(&["near_field.substep=auto", "near_field.tolerance=1e-5"]);
         for scene in [falling, scene(&[]), chosen] {
-            let rungs = ladders(&["event-driven".into()]).flat_map(|ladder| ladder.rungs(&scene, &SCALES, false));
+            let rungs = ladders(&names).flat_map(|ladder| ladder.rungs(&scene, &SCALES, false));
             let steps: Vec<_> = rungs.map(|rung| (rung.value, rung.scene.substep())).collect();
             assert_eq!(steps, [16e-6, 8e-6, 4e-6, 2e-6].map(|step| (Some(step), Substep::Fixed(step))));
         }

@@ -19,6 +19,8 @@
 
 mod entry;
 mod errors;
+#[cfg(test)]
+pub(crate) mod fake;
 mod ladder;
 mod measure;
 mod reference;

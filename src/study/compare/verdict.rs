@@ -36,6 +36,12 @@ impl Comparison {
 }
 
 impl Curve {
+    /// The scheme, with the setting that is varied where it has one.
+    #[must_use]
+    pub fn name(&self) -> String {
+        if self.setting.is_empty() { self.scheme.to_owned() } else { format!("{} ({})", self.scheme, self.setting) }
+    }
+
     /// The entries that came to their end.
     pub fn done(&self) -> impl Iterator<Item = (&Entry, &Scores)> {
         self.entries.iter().filter_map(|entry| Some((entry, entry.result.as_ref().ok()?)))
@@ -74,4 +80,47 @@ impl Curve {
 #[must_use]
 pub fn order(coarse: (f64, f64), fine: (f64, f64)) -> f64 {
     (coarse.1 / fine.1).ln() / (coarse.0 / fine.0).ln()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Regime;
+    use super::super::fake::{FLOOR, comparison};
+    use super::*;
+
+    #[test]
+    fn the_time_for_an_error_lies_between_those_of_two_settings() {
+        let comparison = comparison(Regime::Statistical);
+        let [exact, steps, moduli, refused] = comparison.curves.as_slice() else { panic!("four curves") };
+        // Time 1e-3 / step, error = step.
+        for error in [0.4, 0.3, 0.1, 0.03, 0.005] {
+            approx::assert_relative_eq!(
+                steps.cost_of(error).expect("it gets there"),
+                1e-3 / error,
+                max_relative = 1e-12
+            );
+        }
+        assert_eq!(steps.cost_of(1.0), Some(2.5e-3), "the coarsest is better than that");
+        assert_eq!([steps.cost_of(1e-3), moduli.cost_of(0.01), refused.cost_of(1.0)], [None; 3]);
+        assert_eq!([exact.cost_of(0.1), exact.cost_of(FLOOR), exact.cost_of(1e-3)], [Some(0.01), Some(0.01), None]);
+    }
+
+    #[test]
+    fn levels_are_powers_of_ten_that_several_schemes_reach() {
+        let levels = comparison(Regime::Statistical).levels();
+        let told: Vec<_> =
+            levels.iter().map(|level| (level.error, level.costs.iter().map(|cost| cost.0).collect())).collect();
+        assert_eq!(told, [(0.1, vec![0, 1, 2]), (0.01, vec![0, 1])]);
+    }
+
+    #[test]
+    fn the_observed_order_leaves_out_what_is_below_the_floor() {
+        let mut comparison = comparison(Regime::Pointwise);
+        approx::assert_relative_eq!(comparison.curves[1].order().expect("a power law"), 1.0, max_relative = 1e-12);
+        assert_eq!(comparison.curves[0].order(), None);
+        let Ok(scores) = &mut comparison.curves[1].entries[3].result else { panic!("it has a result") };
+        scores.error = 0.5 * FLOOR;
+        approx::assert_relative_eq!(comparison.curves[1].order().expect("a power law"), 1.0, max_relative = 1e-12);
+        assert_eq!(order((0.4, 0.16), (0.2, 0.04)).round(), 2.0);
+    }
 }
