@@ -225,9 +225,10 @@ mod tests {
         soft.near_field = None;
         soft.run.scheme = Scheme::SoftSphere;
         soft.soft_sphere = Some(SoftSphere { poisson_ratio: 0.2, ..SoftSphere::default() });
-        for scene in [scene(&[]), soft] {
+        for (scene, sub_step) in [(scene(&[]), Some(4e-6)), (soft, None)] {
+            let scales = Scales { sub_step, ..SCALES };
             for ladder in ladders(&[]) {
-                for rung in ladder.rungs(&scene, &SCALES, false) {
+                for rung in ladder.rungs(&scene, &scales, false) {
                     assert_eq!(check(&rung.scene), Ok(()), "{}", ladder.label(rung.value));
                     let kept = rung.scene.soft_sphere.is_none_or(|table| {
                         table.poisson_ratio == scene.soft_sphere.map_or(0.3, |own| own.poisson_ratio)

@@ -24,7 +24,13 @@ impl Comparison {
             return Vec::new();
         }
         let powers = best.log10().ceil() as i32..=worst.log10().floor() as i32;
-        powers.rev().map(|power| self.level(10.0_f64.powi(power))).filter(|level| level.costs.len() > 1).collect()
+        powers.rev().map(|power| self.level(10.0_f64.powi(power))).filter(|level| self.compares(level)).collect()
+    }
+
+    /// Whether a level is reached by more than one scheme.
+    fn compares(&self, level: &Level) -> bool {
+        let schemes: Vec<_> = level.costs.iter().map(|cost| self.curves[cost.0].scheme).collect();
+        schemes.windows(2).any(|pair| pair[0] != pair[1])
     }
 
     fn level(&self, error: f64) -> Level {
