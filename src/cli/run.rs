@@ -79,6 +79,7 @@ pub(super) fn run(args: &Args) -> Result<Ending, Failure> {
     let sub_steps = simulation.sub_steps().map_err(|broken| Failure::Run(miette!("{broken}")))?;
     let outcome = output::Outcome {
         sub_steps,
+        steps: simulation.steps(),
         interrupted: outcome.interrupted,
         entries_deferred: simulation.nozzles().iter().map(Nozzle::deferred).sum(),
         cpu_seconds: processor.elapsed().as_secs_f64(),

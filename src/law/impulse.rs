@@ -26,8 +26,13 @@ impl Body {
         self.spin.cross(&arm) * self.radius
     }
 
-    /// Takes up `impulse` (N s) at the point at `arm` (unit vector) times its radius: I = 2/5 m r².
-    fn take(&mut self, impulse: Vector3<f64>, tangential: Vector3<f64>, arm: Vector3<f64>) {
+    /// Velocity of the point of the grain at `arm` (unit vector) times its radius, m/s.
+    pub(crate) fn velocity_at(&self, arm: Vector3<f64>) -> Vector3<f64> {
+        self.velocity + self.turning(arm)
+    }
+
+    /// Takes up `impulse` (N s), of which `tangential` turns it, at the point at `arm` (unit vector) times its radius: I = 2/5 m r².
+    pub(crate) fn take(&mut self, impulse: Vector3<f64>, tangential: Vector3<f64>, arm: Vector3<f64>) {
         self.velocity += impulse / self.mass;
         self.spin += arm.cross(&tangential) / (0.4 * self.mass * self.radius);
     }
@@ -301,7 +306,7 @@ fn contact_under(
 /// The tangential impulse (N s) of two bodies of effective mass `mass` (kg) that slip at `slip` (m/s) under the normal impulse `j_n` (N s), and
 /// the energy that it dissipates, J.
 #[inline]
-fn friction(law: &ContactLaw, mass: f64, slip: Vector3<f64>, j_n: f64) -> (Vector3<f64>, f64) {
+pub(crate) fn friction(law: &ContactLaw, mass: f64, slip: Vector3<f64>, j_n: f64) -> (Vector3<f64>, f64) {
     let slip_speed = slip.norm();
     if slip_speed == 0.0 {
         return (Vector3::zeros(), 0.0);

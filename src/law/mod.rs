@@ -3,6 +3,7 @@
 mod impulse;
 pub(crate) mod near_field;
 
+pub(crate) use impulse::friction;
 pub use impulse::{
     Body, External, Impulse, PairImpulse, SurfaceImpulse, resolve_pair, resolve_pair_under, resolve_surface,
     resolve_surface_under,

@@ -12,6 +12,7 @@ use super::{Error, EventTable, Folder, Summary, vtk};
 use crate::grains::{Grain, Snapshot};
 use crate::observe::{History, Ledger, SurfaceEnergy, SurfaceMap, SurfaceShape};
 use crate::scene::{Radius, Scene};
+use crate::scheme::stepped::Steps;
 use crate::scheme::{GrainCollision, Kick, Observer, Passage, Rest, SubSteps, SurfaceHit};
 
 /// What the observers of a run cannot know.
@@ -23,6 +24,8 @@ pub struct Outcome {
     pub entries_deferred: u64,
     /// How the sub-steps went, where forces act.
     pub sub_steps: Option<SubSteps>,
+    /// How the steps of a time-stepped scheme went.
+    pub steps: Option<Steps>,
     /// Time of the processor, s.
     pub cpu_seconds: f64,
     /// Time on the clock, s.

@@ -9,6 +9,7 @@ use super::Outcome;
 use crate::observe::{Ledger, SurfaceEnergy};
 use crate::scene::{Interference, Scene, Scheme};
 use crate::scheme::SubSteps;
+use crate::scheme::stepped::Steps;
 
 /// Hit orders listed in the summary; `surface_hits.csv` has them all.
 const LISTED_ORDERS: usize = 20;
@@ -53,6 +54,9 @@ pub struct Summary {
     /// How the sub-steps went; absent where no force acts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sub_steps: Option<SubStepping>,
+    /// How the steps of a time-stepped scheme went; absent where time goes from event to event.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub steps: Option<Stepping>,
     /// Deepest overlap at any event, over the smaller radius.
     pub max_overlap_over_radius: f64,
     /// Time of the processor, s.
@@ -253,6 +257,17 @@ impl SubStepping {
     }
 }
 
+/// How the steps of a time-stepped scheme went.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Stepping {
+    /// How many there were.
+    pub count: u64,
+    /// Length of the shortest, s.
+    pub shortest: f64,
+    /// Length of the longest, s.
+    pub longest: f64,
+}
+
 /// Where the mass went, kg.
 #[derive(Clone, Debug, Serialize)]
 pub struct Mass {
@@ -340,6 +355,7 @@ impl Summary {
                 residual: ledger.mass_residual(),
             },
             sub_steps: outcome.sub_steps.as_ref().map(SubStepping::new),
+            steps: outcome.steps.map(|Steps { count, shortest, longest }| Stepping { count, shortest, longest }),
             max_overlap_over_radius: ledger.max_overlap_over_radius(),
             cpu_seconds: outcome.cpu_seconds,
             wall_seconds: outcome.wall_seconds,
@@ -473,6 +489,10 @@ impl Summary {
         writeln!(f, "  {:<26}{:>12} of the radius", "deepest overlap", small(self.max_overlap_over_radius))?;
         if let Some(sub_steps) = &self.sub_steps {
             sub_steps.fmt(f)?;
+        }
+        if let Some(Stepping { count, shortest, longest }) = self.steps {
+            let [shortest, longest] = [shortest, longest].map(|length| quantity(length, "s"));
+            writeln!(f, "\n{} steps of {shortest} to {longest}", grouped(count))?;
         }
         let [cpu, wall] = [self.cpu_seconds, self.wall_seconds].map(|seconds| quantity(seconds, "s"));
         write!(f, "\n{cpu} of processor time in {wall}")?;

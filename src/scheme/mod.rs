@@ -2,6 +2,7 @@
 
 mod event_driven;
 mod resting;
+pub mod soft_sphere;
 pub mod stepped;
 mod substep;
 mod timetable;

@@ -29,10 +29,7 @@
 //!             let Some(near) = crowd.near(pair, 0.0) else { continue };
 //!             let contact = resolve_pair(&crowd.laws().grain, &crowd.body(pair[0]), &crowd.body(pair[1]), near.normal);
 //!             if contact.approach_speed > 0.0 && !crowd.shields(pair) {
-//!                 for (slot, after) in pair.into_iter().zip(&contact.after) {
-//!                     crowd.flights[slot as usize].velocity = after.velocity;
-//!                     crowd.grains[slot as usize].spin = after.spin;
-//!                 }
+//!                 pair.into_iter().zip(&contact.after).for_each(|(slot, after)| crowd.put(slot, after));
 //!                 crowd.tell_pair_impulse(pair, &near, &contact, step, observer);
 //!             }
 //!         }
@@ -50,8 +47,8 @@
 //! * **Forces.** Where [`Crowd::pull`] is not zero, apply it, and [`Crowd::book`] all the momentum that it gives: with it the ledger closes.
 //! * **Records.** Contacts of no duration give one record an impulse, with the overlap that is found; it may be as large as it likes and does
 //!   not stop the run. Contacts that last give one record at their end: see [`Crowd::count_hit`] and [`Crowd::tell_hit`].
-//! * **Interference.** `none` gives no pairs. A grain that passes through the surface is not named at it. [`Crowd::shields`] asks whether the first
-//!   touch of a pair takes one of them out.
+//! * **Interference.** `none` gives no pairs. A grain that passes through the surface is not named at it from the next look on, and
+//!   [`Crowd::may_hit`] says so at once. [`Crowd::shields`] asks whether the first touch of a pair takes one of them out.
 //! * **Slots** of grains change only between steps: where a method keeps something for each grain or pair beyond the step, it hears of that in
 //!   [`Method::renumber`]; grains that enter come last.
 
