@@ -32,7 +32,7 @@ pub(super) struct Args {
     /// Event-driven runs whose means are the reference where the scene is chaotic [default: 16].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=10_000))]
     ensemble: Option<u32>,
-    /// Starts from which each setting of a scheme is run where the scene is chaotic [default: 1].
+    /// Displaced starts from which each setting of a scheme is run where the scene is chaotic [default: 1].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     members: Option<u32>,
     /// Runs whose median is the CPU time [default: 31 below 10 ms, 3 below 1 s, else 1].

@@ -289,7 +289,8 @@ fn verdict(comparison: &Comparison) -> Vec<String> {
         sentences.push("No two schemes reach the same error, so their speeds cannot be compared.".to_owned());
     }
     let orders = comparison.curves.iter().filter_map(|curve| {
-        let order = curve.order()?;
+        // Never "-0.00".
+        let order = (100.0 * curve.order()?).round() / 100.0 + 0.0;
         Some(format!("{} as {}^{order:.2}", curve.scheme, curve.setting))
     });
     let orders: Vec<_> = orders.collect();
@@ -358,7 +359,7 @@ fn percent(value: f64) -> String {
     let parts = 100.0 * value;
     match parts.abs() {
         0.0 => "0 %".to_owned(),
-        size if size < 0.01 => format!("{parts:.0e} %"),
+        size if !(0.01..1e3).contains(&size) => format!("{parts:.0e} %"),
         size => format!("{parts:.*} %", (1 - size.log10().floor() as i32).clamp(0, 3) as usize),
     }
 }
@@ -440,8 +441,8 @@ mod tests {
             lost: 0,
             energy_residual: 0.0,
         };
-        let shown = [0.5 * FLOOR, -0.22, 1e-7, 0.0].map(|error| deviation(&scores(error), 0));
-        assert_eq!(shown, ["~+0.10 %", "-22 %", "~+1e-5 %", "0 %"]);
+        let shown = [0.5 * FLOOR, -0.22, 1e-7, 0.0, 2e5].map(|error| deviation(&scores(error), 0));
+        assert_eq!(shown, ["~+0.10 %", "-22 %", "~+1e-5 %", "0 %", "+2e7 %"]);
     }
 
     #[test]

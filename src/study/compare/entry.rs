@@ -105,7 +105,8 @@ impl Entry {
         entry
     }
 
-    /// Makes the runs, from the start as it is and from displaced ones, and takes the time of the first.
+    /// Makes the runs, and takes the time of the first. Beyond chaos all of them start displaced, as the ensemble does: the small grains of a
+    /// displaced start shift its means by a little.
     fn runs(
         &mut self,
         plan: &Plan,
@@ -119,7 +120,14 @@ impl Entry {
             let (ended, seconds) = runner.run(plan, &mut simulation, &rung.scene, plan.options.budget(), what);
             (result(ended, plan.options.budget()), seconds)
         };
-        let ready = plan.simulation(&rung.scene, None)?;
+        // Numbers of their own: no start of the ensemble is compared with itself.
+        let displacement = |member| plan.displacement(ENSEMBLE, u32::MAX - member);
+        let (members, displaced) = match reference.regime {
+            Regime::Pointwise => (1, false),
+            Regime::Statistical => (plan.options.members(), true),
+        };
+        let start = |member| plan.simulation(&rung.scene, displaced.then(|| displacement(member)));
+        let ready = start(0)?;
         let (first, seconds) = run(ready.clone());
         self.repeats = 1;
         self.cpu_seconds = Some(seconds);
@@ -132,12 +140,8 @@ impl Entry {
         }
         self.repeats = times.len() as u32;
         self.cpu_seconds = median(times);
-        // Before chaos a displaced start tells nothing new.
-        let members = if reference.regime == Regime::Pointwise { 1 } else { plan.options.members() };
         for member in 1..members {
-            // Numbers of their own: no start of the ensemble is compared with itself.
-            let displacement = plan.displacement(ENSEMBLE, u32::MAX - member);
-            runs.push(run(plan.simulation(&rung.scene, Some(displacement))?).0?);
+            runs.push(run(start(member)?).0?);
         }
         Ok(runs)
     }
@@ -153,7 +157,7 @@ fn result(ended: Ended, budget: f64) -> Result<Measured, Fault> {
 }
 
 impl Scores {
-    /// Compares runs of one setting, the first of them from the start as it is.
+    /// Compares runs of one setting.
     fn new(runs: &[Measured], reference: &Reference, plan: &Plan) -> Self {
         let right = reference.values();
         let mean = |quantity: usize| runs.iter().map(|run| run.quantities[quantity]).sum::<f64>() / runs.len() as f64;

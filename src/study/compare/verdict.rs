@@ -12,7 +12,8 @@ pub struct Level {
 }
 
 impl Comparison {
-    /// The errors that some runs reach and others do not: powers of ten from the worst to the best, none of them below the floor.
+    /// The errors that some runs reach and others do not: powers of ten from the worst to the best, none of them below the
+    /// floor or above 1.
     #[must_use]
     pub fn levels(&self) -> Vec<Level> {
         let scores = || self.curves.iter().flat_map(Curve::done).map(|(_, scores)| scores);
@@ -23,7 +24,7 @@ impl Comparison {
         if worst <= 0.0 {
             return Vec::new();
         }
-        let powers = best.log10().ceil() as i32..=worst.log10().floor() as i32;
+        let powers = best.log10().ceil() as i32..=worst.min(1.0).log10().floor() as i32;
         powers.rev().map(|power| self.level(10.0_f64.powi(power))).filter(|level| self.compares(level)).collect()
     }
 
