@@ -185,6 +185,15 @@ impl Simulation {
         }
     }
 
+    /// The length of the steps (s) of a time-stepped scheme, where it is known beforehand.
+    #[must_use]
+    pub fn planned_step(&self) -> Option<f64> {
+        match &self.scheme {
+            Advance::Freely(_) | Advance::UnderForces(_) => None,
+            Advance::Stepped(scheme) => scheme.method().planned_step(),
+        }
+    }
+
     /// The nozzles, with what they have sent and deferred so far.
     #[must_use]
     pub fn nozzles(&self) -> &[Nozzle] {

@@ -332,3 +332,59 @@ fn the_shipped_target_is_a_closed_plate_with_dimples() {
     assert!(landing(0.0, 0.0).abs() < 1e-15);
     assert_eq!(surface.overlaps(Vector3::new(0.1, 0.1, -0.02), 0.001, 0.0).map(|(_, depth)| depth > 0.001), Some(true));
 }
+
+/// Contacts (normal, gap) of a sphere of radius 0.1 at `place` that are nearer than nothing.
+fn contacts(surface: &Surface, place: Vector3<f64>) -> Vec<(Vector3<f64>, f64)> {
+    let flight = Flight { position: place, time: 0.0, velocity: Vector3::zeros(), radius: 0.1 };
+    let mut found = Vec::new();
+    surface.contacts(&flight, 0.0, &mut found);
+    found.into_iter().map(|(_, contact)| (contact.normal, contact.gap)).collect()
+}
+
+/// Wherever a sphere sinks into a flat mesh, over a face, an edge or a corner, it has one contact, and that is the plane's.
+#[test]
+fn a_sphere_in_a_flat_mesh_has_one_contact_and_its_gap() {
+    let flat = RectangleSurface {
+        centre: [0.0; 3],
+        normal: [0.0, 0.0, 1.0],
+        along: [1.0, 0.0, 0.0],
+        size: [1.0, 1.0],
+        divisions: [20, 20],
+        velocity: [0.0; 3],
+    };
+    let surface = Surface::new(&[scene::Surface::Rectangle(flat)], Path::new(".")).expect("it is flat");
+    for i in 0..=40 {
+        for (j, beside) in [0.0, 1e-12, 1e-7, 1e-3].into_iter().enumerate() {
+            let place = Vector3::new(0.0025 * f64::from(i) + beside, 0.05 * j as f64, 0.09);
+            let found = contacts(&surface, place);
+            assert_eq!(found.len(), 1, "{place} {found:?}");
+            assert!((found[0].0 - Vector3::z()).amax() < 1e-12 && (found[0].1 + 0.01).abs() < 1e-12, "{found:?}");
+            let flight = Flight { position: place, time: 0.0, velocity: Vector3::zeros(), radius: 0.1 };
+            assert!((surface.gap(&flight, 1.0) + 0.01).abs() < 1e-12);
+        }
+    }
+}
+
+/// In a groove a sphere touches both sides; on a ridge, and beside the rim of a plate, the edge alone.
+#[test]
+fn a_sphere_touches_both_sides_of_a_groove_and_one_ridge() {
+    let sine = |pieces| SineSurface {
+        centre: [0.0; 3],
+        size: [2.0, 1.0],
+        amplitude: 0.25,
+        wavelength: 1.0,
+        pieces,
+        velocity: [0.0; 3],
+    };
+    // Of four pieces a wave is a zigzag: a ridge at x = 0.25, a groove at x = -0.25, slopes of 45 degrees.
+    let surface = Surface::new(&[scene::Surface::Sine(sine(4))], Path::new(".")).expect("a zigzag");
+    let root = 0.5f64.sqrt();
+    let groove = contacts(&surface, Vector3::new(-0.25, 0.03, -0.25 + 0.095 / root));
+    assert_eq!(groove.len(), 2, "{groove:?}");
+    for (normal, gap) in groove {
+        assert!((normal.x.abs() - root).abs() < 1e-9 && (gap + 0.005).abs() < 1e-9, "{normal} {gap}");
+    }
+    let ridge = contacts(&surface, Vector3::new(0.25, 0.03, 0.25 + 0.09));
+    assert_eq!(ridge.len(), 1, "{ridge:?}");
+    assert!((ridge[0].0 - Vector3::z()).amax() < 1e-9 && (ridge[0].1 + 0.01).abs() < 1e-9, "{ridge:?}");
+}

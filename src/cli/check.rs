@@ -6,7 +6,7 @@ use impinge::scene::{Friction, Scene, SceneFile, Source, Surface};
 use impinge::simulation::Simulation;
 
 use super::estimate::Crowd;
-use super::{Ending, Failure, SceneArgs, digits, forces, print};
+use super::{Ending, Failure, SceneArgs, digits, forces, plain_or_scientific, print};
 
 /// Memory that a grain may take with its events and neighbours, bytes: the bound that the engine is held to.
 const BYTES_PER_GRAIN: f64 = 600.0;
@@ -36,6 +36,10 @@ fn describe(out: &mut String, file: &SceneFile, simulation: &Simulation) -> fmt:
     }
     let (scheme, interference) = (name(run.scheme), name(run.interference));
     writeln!(out, "\nrun         {} to {} s, {scheme}", run.start, run.until)?;
+    if let Some(step) = simulation.planned_step() {
+        let count = ((run.until - run.start) / step).ceil();
+        writeln!(out, "            steps of {} s, about {count} of them", plain_or_scientific(digits(step, 4)))?;
+    }
     writeln!(out, "            interference {interference}, seed {}, {} frames", scene.seed, run.frames)?;
     let planar = if domain.planar { ", planar" } else { "" };
     writeln!(out, "domain      {}{planar}, {:?} to {:?} m", name(domain.boundary), domain.min, domain.max)?;

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use impinge::grains::NewGrain;
 use impinge::law::{NearField, Term};
-use impinge::scene::{Scene, Source, Substep, Summation};
+use impinge::scene::{Scene, Scheme, Source, Substep, Summation};
 use impinge::source;
 
 use super::estimate::Crowd;
@@ -34,7 +34,9 @@ pub(super) fn describe(out: &mut String, scene: &Scene, folder: &Path, count: f6
         writeln!(out, "gravity     {gravity:?} m/s²")?;
     }
     near_field(out, scene, folder, count)?;
-    sub_steps(out, scene)?;
+    if scene.run.scheme == Scheme::EventDriven {
+        sub_steps(out, scene)?;
+    }
     match scene.contact.time {
         Some(time) => writeln!(out, "            contacts take {} s", plain_or_scientific(time)),
         None => Ok(()),

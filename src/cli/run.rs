@@ -8,6 +8,7 @@ use std::time::Instant;
 
 use cpu_time::ProcessTime;
 use impinge::output::{self, Folder, Recorder};
+use impinge::scene::Scheme;
 use impinge::scheme::{Broken, LARGEST_OVERLAP_WITH_FORCES};
 use impinge::simulation::Simulation;
 use impinge::source::Nozzle;
@@ -70,6 +71,7 @@ pub(super) fn run(args: &Args) -> Result<Ending, Failure> {
                 Broken::Overlap { allowed, .. } if allowed == LARGEST_OVERLAP_WITH_FORCES => {
                     "take a shorter `substep`: the overlap of grains under unequal forces goes with its square"
                 }
+                Broken::NotANumber { .. } if file.scene.run.scheme != Scheme::EventDriven => "take shorter steps",
                 Broken::Overlap { .. } | Broken::NotANumber { .. } => "please report the scene",
             };
             let help = format!("{remedy}; what was measured until then is in {}", kept.display());

@@ -175,3 +175,38 @@ fn sub_steps(scene: &Scene) -> Checked {
     let what = format!("{value} has no effect: the scheme \"{scheme}\" makes no sub-steps between events");
     Err(Invalid::new(key, what, "take it out, or set `run.scheme = \"event-driven\"`"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Overrides, SceneFile};
+    use super::*;
+
+    const EVERYTHING: &str = include_str!("../../tests/everything.toml");
+
+    fn scene(set: &[&str]) -> Scene {
+        // What speaks of sub-steps goes: steps have none.
+        let near_field = "near_field={alpha1=1, beta1=2, alpha2=0, beta2=3}";
+        let contact = "contact={grain={restitution=1}, surface={restitution=1}}";
+        let set = [near_field, contact].iter().chain(set).map(|text| (*text).to_owned()).collect();
+        let overrides = Overrides { set, ..Overrides::default() };
+        SceneFile::parse("all.toml".as_ref(), EVERYTHING, &overrides).unwrap_or_else(|error| panic!("{error}")).scene
+    }
+
+    #[test]
+    fn every_table_is_read_with_its_scheme_and_filled_with_defaults() {
+        let fixed = scene(&["run.scheme=fixed-point", "fixed_point={largest_step=1e-4, safety=0.5}"]).fixed_point;
+        assert_eq!(fixed, Some(FixedPoint { largest_step: Some(1e-4), safety: 0.5, ..FixedPoint::default() }));
+        let trapezoidal = scene(&["run.scheme=trapezoidal", "trapezoidal={step=1e-5}"]).trapezoidal;
+        assert_eq!(trapezoidal, Some(Trapezoidal { step: Some(1e-5), phi: 0.5, tolerance: 1e-6 }));
+        let soft = scene(&["run.scheme=soft-sphere", "soft_sphere.young_modulus=1e11"]).soft_sphere;
+        assert_eq!(soft, Some(SoftSphere { young_modulus: 1e11, ..SoftSphere::default() }));
+        assert_eq!(scene(&["run.scheme=soft-sphere"]).soft_sphere, None);
+    }
+
+    #[test]
+    fn schemes_are_named_as_in_the_file() {
+        for scheme in [Scheme::EventDriven, Scheme::FixedPoint, Scheme::Trapezoidal, Scheme::SoftSphere] {
+            assert_eq!(serde_json::to_value(scheme).expect("a name"), scheme.name());
+        }
+    }
+}

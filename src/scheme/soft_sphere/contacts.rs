@@ -303,3 +303,57 @@ impl Contact {
         crowd.tell_hit(self.slot, &hit, observer);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use rand::{RngExt as _, SeedableRng as _};
+
+    use super::*;
+
+    fn contact(pair: [u32; 2]) -> Contact {
+        let hertz = Hertz::new(1e9, 1.0, 1.0, 0.8);
+        let normal = Vector3::x();
+        let touch = Touch { position: normal, normal, approach_speed: 1.0, element: 0, order: 0, energies: [0.0; 3] };
+        Contact::new(pair, hertz, Vector3::zeros(), touch)
+    }
+
+    /// Whatever begins, ends and gets new slots, each open contact is found by its pair, and no other.
+    #[test]
+    fn chains_name_the_open_contacts() {
+        const GRAINS: u32 = 12;
+        let mut random = rand_pcg::Pcg64::seed_from_u64(5);
+        let mut contacts = Contacts::default();
+        contacts.resize(GRAINS as usize);
+        let mut open = BTreeSet::new();
+        for turn in 0..4000 {
+            let pair: [u32; 2] = [random.random_range(0..GRAINS - 1), random.random_range(1..GRAINS)];
+            if pair[0] >= pair[1] {
+                continue;
+            }
+            if open.remove(&pair) {
+                let mut ended = Vec::new();
+                contacts.end(|open| [open.slot, open.partner] == pair, |gone| ended.push([gone.slot, gone.partner]));
+                assert_eq!(ended, [pair]);
+            } else {
+                contacts.begin(contact(pair));
+                open.insert(pair);
+            }
+            if turn % 100 == 0 {
+                // The first grain goes, all others move up, and a new one comes last.
+                contacts.end(|open| open.slot == 0, drop);
+                let slots: Vec<u32> = (0..GRAINS).map(|slot| if slot == 0 { GONE } else { slot - 1 }).collect();
+                contacts.renumber(&slots, true);
+                contacts.resize(GRAINS as usize);
+                open = open.into_iter().filter(|pair| pair[0] > 0).map(|[a, b]| [a - 1, b - 1]).collect();
+            }
+            for a in 0..GRAINS {
+                for b in a + 1..GRAINS {
+                    let found = contacts.of_pair([a, b]).map(|found| [found.slot, found.partner]);
+                    assert_eq!(found, open.get(&[a, b]).copied());
+                }
+            }
+        }
+    }
+}

@@ -159,6 +159,14 @@ mod tests {
         assert!(glass(0.25e-3).duration(10.0) > 10.0 * printed);
     }
 
+    /// PHYSICS 1.8: half the mass and half the radius at the surface, as printed, would give 0.85 where 0.8 is asked for.
+    #[test]
+    fn the_surface_takes_mass_and_radius_of_the_grain() {
+        let grain = |mass, radius| Hertz { mass: 1e-6, ..Hertz::new(1e10, mass, radius, 0.8) };
+        let (right, printed) = (impact(&grain(1e-6, 1e-3), 1.0, 0.25).0, impact(&grain(0.5e-6, 0.5e-3), 1.0, 0.25).0);
+        assert!((right - 0.8).abs() < 2e-4 && (printed - 0.854).abs() < 2e-3, "{right} and {printed}");
+    }
+
     #[test]
     fn without_restitution_the_damping_is_finite() {
         let contact = Hertz::new(1e9, 1.0, 1.0, 0.0);

@@ -28,7 +28,7 @@ use self::contacts::{Contact, Contacts};
 pub use self::hertz::{Hertz, effective_modulus};
 use super::stepped::{Crowd, GONE, Method, even, retain};
 use super::{Broken, Observer};
-use crate::law::friction;
+use crate::law::{Friction, friction};
 use crate::scene;
 
 /// Grains as soft spheres.
@@ -58,10 +58,10 @@ pub struct SoftSphere {
 }
 
 impl SoftSphere {
-    /// Soft spheres of the given stiffness for grains that hit each other at up to `fastest` (m/s), which decides on the step.
+    /// Soft spheres of the given stiffness for the grains of `crowd`, which hit each other at up to `fastest` (m/s).
     #[must_use]
-    pub fn new(settings: &scene::SoftSphere, fastest: f64) -> Self {
-        Self {
+    pub fn new(settings: &scene::SoftSphere, crowd: &Crowd, fastest: f64) -> Self {
+        let mut scheme = Self {
             modulus: effective_modulus(settings.young_modulus, settings.poisson_ratio),
             fraction: settings.step_fraction,
             fastest,
@@ -74,11 +74,28 @@ impl SoftSphere {
             pairs: Contacts::default(),
             hits: Contacts::default(),
             found: Vec::new(),
+        };
+        scheme.shorten(crowd, 0);
+        scheme
+    }
+
+    /// The longest step, s; infinity where there are no grains yet.
+    #[must_use]
+    pub fn longest_step(&self) -> f64 {
+        self.step
+    }
+
+    /// A step is a part of the shortest contact time that grains from slot `from` on can have at the fastest impact: that of two of the smallest.
+    fn shorten(&mut self, crowd: &Crowd, from: usize) {
+        for slot in from..crowd.len() {
+            let body = crowd.body(slot as u32);
+            // The contact time goes with (m² / r)^(1/5): unlike grains have a longer one.
+            let two_alike = Hertz::new(self.modulus, 0.5 * body.mass, 0.5 * body.radius, 1.0);
+            self.step = self.step.min(self.fraction * two_alike.duration(self.fastest));
         }
     }
 
-    /// Takes in the grains that have come since the last step. A step is a part of the shortest contact time that grains at the fastest impact can
-    /// have: that of two of the smallest.
+    /// Takes in the grains that have come since the last step.
     fn take_in(&mut self, crowd: &mut Crowd) -> Result<(), Broken> {
         let known = self.acceleration.len();
         if known == crowd.len() {
@@ -88,12 +105,7 @@ impl SoftSphere {
         self.acceleration.extend_from_slice(&self.pull[known..]);
         self.pairs.resize(crowd.len());
         self.hits.resize(crowd.len());
-        for slot in known..crowd.len() {
-            let body = crowd.body(slot as u32);
-            // The contact time goes with (m² / r)^(1/5): unlike grains have a longer one.
-            let two_alike = Hertz::new(self.modulus, 0.5 * body.mass, 0.5 * body.radius, 1.0);
-            self.step = self.step.min(self.fraction * two_alike.duration(self.fastest));
-        }
+        self.shorten(crowd, known);
         Ok(())
     }
 
@@ -163,7 +175,8 @@ impl SoftSphere {
         let Self { pairs, hits, now, .. } = self;
         let laws = *crowd.laws();
         let touches = |contact: &&mut Contact| !contact.is_over(*now) && contact.force > 0.0;
-        for contact in pairs.iter_mut().filter(touches) {
+        let pairs = pairs.iter_mut().filter(|_| laws.grain.friction != Friction::Smooth);
+        for contact in pairs.filter(touches) {
             let normal = contact.normal;
             let [mut a, mut b] = [contact.slot, contact.partner].map(|slot| crowd.body(slot));
             let slip = b.velocity_at(-normal) - a.velocity_at(normal);
@@ -175,7 +188,8 @@ impl SoftSphere {
             crowd.put(contact.slot, &a);
             crowd.put(contact.partner, &b);
         }
-        for contact in hits.iter_mut().filter(touches) {
+        let hits = hits.iter_mut().filter(|_| laws.surface.friction != Friction::Smooth);
+        for contact in hits.filter(touches) {
             let normal = contact.normal;
             let mut body = crowd.body(contact.slot);
             let slip = contact.surface - body.velocity_at(normal);
@@ -219,8 +233,8 @@ impl SoftSphere {
 
 impl Method for SoftSphere {
     fn step(&mut self, crowd: &mut Crowd, room: f64, observer: &mut impl Observer) -> Result<f64, Broken> {
-        let step = even(room, self.step);
         self.take_in(crowd)?;
+        let step = even(room, self.step);
         self.now += 1;
         self.book(crowd, 0.5 * step);
         for (flight, acceleration) in crowd.flights.iter_mut().zip(&self.acceleration) {
@@ -228,8 +242,11 @@ impl Method for SoftSphere {
             flight.velocity += acceleration * step;
         }
         crowd.look(step, 0.0);
-        crowd.pull(&mut self.next_pull)?;
-        self.next.clone_from(&self.next_pull);
+        crowd.pull(&mut self.next)?;
+        if crowd.has_near_field() {
+            // What contacts add is told by them, and booking needs the rest alone.
+            self.next_pull.clone_from(&self.next);
+        }
         self.press_pairs(crowd);
         self.press_off_surface(crowd, step)?;
         for ((flight, next), acceleration) in crowd.flights.iter_mut().zip(&self.next).zip(&self.acceleration) {

@@ -21,13 +21,23 @@ impl Comparator {
         match scene.run.scheme {
             Scheme::SoftSphere => {
                 let fastest = fastest_nozzle(scene).max(crowd.fastest_impact());
-                Ok(Self::SoftSphere(SoftSphere::new(&scene.soft_sphere.unwrap_or_default(), fastest)))
+                Ok(Self::SoftSphere(SoftSphere::new(&scene.soft_sphere.unwrap_or_default(), crowd, fastest)))
             }
             other => Err(Invalid::new(
                 "run.scheme",
                 format!("the scheme \"{}\" is not in this version", other.name()),
                 "use `scheme = \"event-driven\"`, or leave it out",
             )),
+        }
+    }
+}
+
+impl Comparator {
+    /// The length of its steps (s) where it is known beforehand.
+    #[must_use]
+    pub fn planned_step(&self) -> Option<f64> {
+        match self {
+            Self::SoftSphere(scheme) => Some(scheme.longest_step()).filter(|step| step.is_finite()),
         }
     }
 }

@@ -54,6 +54,8 @@ pub struct Crowd {
     /// Whether grains that have hit the surface pass through it from then on.
     once_only: bool,
     leaving: Vec<(u32, Passage)>,
+    /// Mass of all grains, kg.
+    mass: f64,
     start: f64,
     /// Time since the start, s: it resolves a step where simulated time does not.
     clock: f64,
@@ -85,6 +87,7 @@ impl Crowd {
         // Neighbours in space are neighbours in memory.
         let order = side_by_side(grains);
         Self {
+            mass: grains.iter().map(NewGrain::mass).sum(),
             flights: order.iter().map(|&id| flight(&grains[id])).collect(),
             grains: order.iter().map(|&id| carried(&grains[id], id as u64)).collect(),
             laws,
@@ -191,12 +194,8 @@ impl Crowd {
     pub fn look(&mut self, after: f64, reach: f64) {
         let now = self.clock + after;
         let Self { flights, neighbours, domain, .. } = self;
-        if self.laws.interference != Interference::None {
-            let drifted = neighbours.drifted(now);
-            let holds = |(slot, flight): (usize, &Flight)| neighbours.holds(slot, flight.position, drifted, domain);
-            if !(neighbours.suits(flights.len(), reach) && flights.iter().enumerate().all(holds)) {
-                neighbours.make(flights, domain, now, reach, after);
-            }
+        if self.laws.interference != Interference::None && !neighbours.holds(flights, domain, now, reach) {
+            neighbours.make(flights, domain, now, reach, after);
         }
         self.look_for_surface(now, after, reach);
     }
@@ -332,13 +331,12 @@ impl Crowd {
         forces.pull(grains, flights, *strengths, pull).map_err(|singular| self.singular(&singular))
     }
 
-    /// Books that `pull` (m/s², from [`pull`](Self::pull)) has acted for `duration` (s) on grains that fly as they do now. A scheme does so for
+    /// Books that `pull` (m/s², from [`pull`](Self::pull), read only where a near field acts) has acted for `duration` (s) on grains that fly as they do now. A scheme does so for
     /// all the momentum that forces give to its grains, or the ledger does not close.
     pub fn book(&mut self, pull: &[Vector3<f64>], duration: f64) {
         let gravity = self.forces.gravity;
         if gravity != Vector3::zeros() {
-            let mass: f64 = self.grains.iter().map(|grain| grain.mass).sum();
-            self.books.impulse_gravity += gravity * (mass * duration);
+            self.books.impulse_gravity += gravity * (self.mass * duration);
         }
         if self.forces.near_field.is_some() {
             for ((pull, grain), flight) in pull.iter().zip(&self.grains).zip(&self.flights) {
@@ -396,20 +394,13 @@ impl Crowd {
     pub(super) fn end_step(&mut self, taken: f64) -> Result<Option<Vec<u32>>, Broken> {
         impinge_events::Surface::start_epoch(&mut self.surface, taken);
         self.clock += taken;
-        let Domain { min, max, periodic, .. } = self.domain;
+        let Domain { min, max, .. } = self.domain;
         for slot in 0..self.flights.len() {
-            let Flight { position, velocity, .. } = self.flights[slot];
+            let place = &self.flights[slot].position;
             // Not `<` and `>`: what is no number is not inside.
-            if (0..3).all(|axis| min[axis] <= position[axis] && position[axis] <= max[axis]) {
-                continue;
-            }
-            if !position.iter().chain(&velocity).all(|x| x.is_finite()) {
-                return Err(Broken::NotANumber { time: self.time(), grains: vec![self.grains[slot].id] });
-            }
-            if periodic {
-                self.wrap(slot);
-            } else {
-                self.leaving.push((slot as u32, Passage::Left));
+            let inside = |axis: usize| min[axis] <= place[axis] && place[axis] <= max[axis];
+            if !(inside(0) && inside(1) && inside(2)) {
+                self.outside(slot)?;
             }
         }
         Ok((!self.leaving.is_empty()).then(|| self.new_slots()))
@@ -422,10 +413,21 @@ impl Crowd {
         slots
     }
 
-    fn wrap(&mut self, slot: usize) {
+    /// A grain is no longer inside the domain.
+    #[cold]
+    fn outside(&mut self, slot: usize) -> Result<(), Broken> {
+        let Flight { position, velocity, .. } = self.flights[slot];
+        if !position.iter().chain(&velocity).all(|x| x.is_finite()) {
+            return Err(Broken::NotANumber { time: self.time(), grains: vec![self.grains[slot].id] });
+        }
+        if !self.domain.periodic {
+            self.leaving.push((slot as u32, Passage::Left));
+            return Ok(());
+        }
         let before = self.depth(&self.flights[slot], &self.grains[slot]);
         self.domain.wrap(&mut self.flights[slot].position);
         self.books.carried_away += before - self.depth(&self.flights[slot], &self.grains[slot]);
+        Ok(())
     }
 
     /// Takes out the grains that go.
@@ -442,6 +444,7 @@ impl Crowd {
         retain(&mut self.flights, slots);
         retain(&mut self.grains, slots);
         retain(&mut self.clear, slots);
+        self.mass = self.grains.iter().map(|grain| grain.mass).sum();
         self.neighbours.clear();
     }
 
@@ -450,6 +453,7 @@ impl Crowd {
         let (flight, grain) = (flight(new), carried(new, self.entered));
         self.entered += 1;
         self.strengths |= grain.strength != 1.0;
+        self.mass += grain.mass;
         self.books.carried_away += -self.depth(&flight, &grain);
         self.flights.push(flight);
         self.grains.push(grain);

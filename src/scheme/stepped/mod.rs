@@ -68,6 +68,8 @@ use crate::grains::NewGrain;
 
 /// Steps of single grains between two looks at the watch (progress, Ctrl-C).
 const GRAIN_STEPS_PER_WATCH: usize = 100_000;
+/// What a quotient of two times may have lost to rounding over many steps, relative.
+const ROUNDING: f64 = 1e-9;
 
 /// How a time-stepped scheme takes a step.
 pub trait Method {
@@ -89,7 +91,7 @@ pub trait Method {
 pub struct Steps {
     /// How many there were.
     pub count: u64,
-    /// Shortest and longest, s.
+    /// Shortest, s.
     pub shortest: f64,
     /// Longest, s.
     pub longest: f64,
@@ -167,6 +169,12 @@ impl<M: Method> Stepped<M> {
         &self.crowd
     }
 
+    /// How it takes its steps.
+    #[must_use]
+    pub fn method(&self) -> &M {
+        &self.method
+    }
+
     /// How the steps went.
     #[must_use]
     pub fn steps(&self) -> Steps {
@@ -194,5 +202,23 @@ pub fn even(room: f64, longest: f64) -> f64 {
     room / (room / longest * (1.0 - ROUNDING)).ceil().max(1.0)
 }
 
-/// What a quotient of two times may have lost to rounding over many steps, relative.
-const ROUNDING: f64 = 1e-9;
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_fill_the_room_evenly() {
+        assert_eq!(even(1.0, 0.3), 0.25);
+        assert_eq!(even(1.0, f64::INFINITY), 1.0);
+        assert_eq!(even(0.1, 0.3), 0.1);
+        // Three tenths over one tenth is a little more than three.
+        assert_eq!(even(0.30000000000000004, 0.1), 0.30000000000000004 / 3.0);
+    }
+
+    #[test]
+    fn the_shortest_and_the_longest_step_are_kept() {
+        let mut steps = Steps::default();
+        [2.0, 1.0, 3.0].into_iter().for_each(|taken| steps.note(taken));
+        assert_eq!(steps, Steps { count: 3, shortest: 1.0, longest: 3.0 });
+    }
+}
