@@ -100,7 +100,10 @@ pub(super) fn compare(args: &Args) -> Result<Ending, Failure> {
 
     let comparison = match comparison {
         Ok(comparison) => comparison,
-        Err(Failed::Interrupted) => return Ok(Ending::Interrupted),
+        Err(failed @ Failed::Interrupted) => {
+            print(&format!("{failed}; nothing was written\n"))?;
+            return Ok(Ending::Interrupted);
+        }
         Err(Failed::Invalid(invalid)) => return Err(file.locate(invalid).into()),
         Err(failed) => return Err(Failure::Run(miette!(help = "`impinge run` tells more about it", "{failed}"))),
     };

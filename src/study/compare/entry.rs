@@ -135,7 +135,9 @@ impl Entry {
         let mut times = vec![seconds];
         for _ in 1..plan.options.repeats(seconds) {
             let (again, seconds) = run(ready.clone());
-            again?;
+            if again == Err(Fault::Interrupted) {
+                return Err(Fault::Interrupted);
+            }
             times.push(seconds);
         }
         self.repeats = times.len() as u32;
