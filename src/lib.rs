@@ -18,7 +18,7 @@
 //! ```
 //!
 //! Data flows one way: [`scene`] (what the user wrote) → [`source`], [`surface`], [`law`] → [`scheme`] (advances time) → [`observe`] (measures) →
-//! [`output`] (writes). [`simulation`] puts a scene together and runs it. Everything is in SI units.
+//! [`output`] (writes). [`simulation`] puts a scene together and runs it; a [`study`] runs many. Everything is in SI units.
 
 pub mod grains;
 pub mod law;
@@ -29,6 +29,7 @@ pub mod scene;
 pub mod scheme;
 pub mod simulation;
 pub mod source;
+pub mod study;
 mod sum;
 pub mod surface;
 

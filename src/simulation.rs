@@ -13,7 +13,7 @@ use crate::near_field::{Bound, CutOff, ForceSum, Method};
 use crate::scene::{self, Boundary, Interference, Invalid, Scene, Substep, Summation};
 use crate::scheme::stepped::{Comparator, Crowd, Stepped, Steps};
 use crate::scheme::{Broken, EventDriven, Forces, Laws, Length, Moments, Observer, Progress, SubSteps, Substepped};
-use crate::source::{self, Nozzle, Placed};
+use crate::source::{self, Displacement, Nozzle, Placed};
 use crate::surface::Surface;
 
 /// Skin of the neighbour lists of a near field with a cut-off, over the cut-off.
@@ -55,6 +55,8 @@ pub struct Simulation {
     scheme: Advance,
     counts: Vec<usize>,
     nozzles: Vec<Nozzle>,
+    /// The domain, and what moves the grains that enter; none but where a start is displaced on purpose.
+    displacement: Option<(Domain, Displacement)>,
     samples: Moments,
     frames: Moments,
     until: f64,
@@ -66,6 +68,22 @@ impl Simulation {
     /// # Errors
     /// A value of the scene that cannot be used, by its key.
     pub fn new(scene: &Scene, folder: &Path) -> Result<Self, Invalid> {
+        Self::prepare(scene, folder, None)
+    }
+
+    /// The same from a start a little aside: every grain that is there, or enters later, is displaced.
+    ///
+    /// # Errors
+    /// As [`Simulation::new`].
+    pub fn displaced(scene: &Scene, folder: &Path, displacement: Displacement) -> Result<Self, Invalid> {
+        Self::prepare(scene, folder, Some((domain(scene), displacement)))
+    }
+
+    fn prepare(
+        scene: &Scene,
+        folder: &Path,
+        mut displacement: Option<(Domain, Displacement)>,
+    ) -> Result<Self, Invalid> {
         let surface = Surface::new(&scene.surface, folder)?;
         if scene.domain.planar {
             surface.check_planar()?;
@@ -75,7 +93,10 @@ impl Simulation {
             let (element, depth) = surface.overlaps(centre, radius, after)?;
             Some((surface.number_of(element), depth))
         };
-        let placed = source::place(scene, folder, &|centre, radius| overlap(centre, radius, 0.0))?;
+        let mut placed = source::place(scene, folder, &|centre, radius| overlap(centre, radius, 0.0))?;
+        if let Some((domain, displacement)) = &mut displacement {
+            placed.grains.iter_mut().for_each(|grain| displacement.apply(grain, domain));
+        }
         for nozzle in &placed.nozzles {
             let after = nozzle.opens() - scene.run.start;
             nozzle.check_clear(&|centre, radius| overlap(centre, radius, after))?;
@@ -86,6 +107,7 @@ impl Simulation {
             scheme,
             counts: placed.counts,
             nozzles: placed.nozzles,
+            displacement,
             samples: moments(scene.output.samples.max(2)),
             frames: moments(scene.run.frames),
             until: scene.run.until,
@@ -116,13 +138,16 @@ impl Simulation {
                     self.frames.advance();
                 }
                 Stop::Entry(nozzle) => {
-                    let Self { scheme, nozzles, .. } = self;
+                    let Self { scheme, nozzles, displacement, .. } = self;
                     let entering = nozzles[nozzle].enter(time, &mut |place, radius| {
                         let inside = scheme.surface().overlaps(place, radius, time - scheme.surface_time());
                         inside.is_none_or(|(_, depth)| source::just_touches(depth, radius))
                             && scheme.is_free(place, radius, time)
                     });
-                    if let Some(grain) = entering {
+                    if let Some(mut grain) = entering {
+                        if let Some((domain, displacement)) = displacement {
+                            displacement.apply(&mut grain, domain);
+                        }
                         scheme.enter(time, &grain, observer);
                     }
                 }

@@ -4,6 +4,7 @@
 //! 2 the command line or the scene is wrong, 130 interrupted by Ctrl-C.
 
 mod check;
+mod compare;
 mod estimate;
 mod forces;
 mod progress;
@@ -30,6 +31,8 @@ struct Cli {
 enum Command {
     /// Run a scene and write its results into a folder.
     Run(run::Args),
+    /// Run a scene with every scheme: speed against error.
+    Compare(compare::Args),
     /// Validate a scene and print what it would do.
     Check(check::Args),
     /// Print the JSON schema of scene files.
@@ -90,6 +93,7 @@ pub(crate) fn main() -> ExitCode {
     show_errors_plainly();
     let result = match &Cli::parse().command {
         Command::Run(args) => run::run(args),
+        Command::Compare(args) => compare::compare(args),
         Command::Check(args) => check::check(args),
         Command::Schema => schema::schema(),
     };

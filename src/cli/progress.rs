@@ -23,9 +23,18 @@ pub(super) struct ProgressLine {
 
 impl ProgressLine {
     pub(super) fn new(run: &Run, quiet: bool) -> Self {
+        Self::labelled(run, quiet, "")
+    }
+
+    /// The same with a word on what the run is for.
+    pub(super) fn labelled(run: &Run, quiet: bool, label: &str) -> Self {
         let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-        let style = ProgressStyle::with_template("{percent:>3} % [{bar:30}] {msg}").expect("the template is right");
+        let style =
+            ProgressStyle::with_template("{prefix}{percent:>3} % [{bar:30}] {msg}").expect("the template is right");
         let bar = ProgressBar::with_draw_target(Some(STEPS as u64), target).with_style(style.progress_chars("=> "));
+        if !label.is_empty() {
+            bar.set_prefix(format!("{label}: "));
+        }
         Self { bar, start: run.start, until: run.until, began: Instant::now(), shown: None }
     }
 

@@ -93,13 +93,13 @@ pub(super) fn run(args: &Args) -> Result<Ending, Failure> {
 }
 
 /// An output error with its remedy.
-fn report(error: &output::Error) -> Report {
+pub(super) fn report(error: &output::Error) -> Report {
     miette!(help = error.remedy(), "{error}")
 }
 
 /// A flag that Ctrl-C raises, or the polite request of a batch system to end; the run stops at its next look. A second one does
 /// not wait for that.
-fn catch_interrupt() -> Result<Arc<AtomicBool>, Failure> {
+pub(super) fn catch_interrupt() -> Result<Arc<AtomicBool>, Failure> {
     let flag = Arc::new(AtomicBool::new(false));
     let raised = Arc::clone(&flag);
     ctrlc::set_handler(move || {

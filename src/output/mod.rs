@@ -2,6 +2,7 @@
 //!
 //! [`Folder`] keeps earlier results safe, [`Recorder`] watches the run and writes, [`Summary`] is what it came to.
 
+mod comparison;
 mod error;
 mod folder;
 pub mod plots;
@@ -10,6 +11,7 @@ mod summary;
 mod tables;
 pub mod vtk;
 
+pub use comparison::{comparison_text, write_comparison};
 pub use error::Error;
 pub use folder::Folder;
 pub use recorder::{Outcome, Recorder};

@@ -7,6 +7,7 @@
 mod block;
 mod cells;
 mod context;
+mod displacement;
 mod file;
 mod lattice;
 mod nozzle;
@@ -18,6 +19,7 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
+pub use displacement::Displacement;
 pub use nozzle::Nozzle;
 
 use crate::grains::NewGrain;

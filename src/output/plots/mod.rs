@@ -7,6 +7,7 @@ mod hit_order;
 mod impacts;
 mod raster;
 mod side_view;
+mod speed_against_error;
 
 use std::io;
 
@@ -18,6 +19,7 @@ pub use history::energy_history;
 pub use hit_order::energy_by_hit_order;
 pub use impacts::impacts;
 pub use side_view::SideView;
+pub use speed_against_error::speed_against_error;
 
 /// Units of drawing per pixel. The SVG backend knows whole units only, and a grain may be smaller than a pixel.
 const FINE: i32 = 10;

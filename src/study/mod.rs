@@ -1,0 +1,3 @@
+//! Studies: many runs, and what they say together.
+
+pub mod compare;
