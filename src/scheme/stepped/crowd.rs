@@ -162,6 +162,30 @@ impl Crowd {
         Body { mass: grain.mass, radius: flight.radius, velocity: flight.velocity, spin: grain.spin }
     }
 
+    /// Gives a grain the velocity and spin of `body`.
+    pub fn put(&mut self, slot: u32, body: &Body) {
+        self.flights[slot as usize].velocity = body.velocity;
+        self.grains[slot as usize].spin = body.spin;
+    }
+
+    /// A speed (m/s) at which grains may hit each other or the surface: that of the fastest grain now, and of the surface, and what a fall through the
+    /// whole domain adds to it, or two grains that the near field draws from far away to contact.
+    #[must_use]
+    pub fn fastest_impact(&self) -> f64 {
+        let fastest = self.flights.iter().map(|flight| flight.velocity.norm()).fold(0.0, f64::max) + self.surface_speed;
+        let gravity = self.forces.gravity;
+        let fall = if gravity == Vector3::zeros() { 0.0 } else { gravity.abs().dot(&self.domain.extent()) };
+        let drawn = self.forces.near_field.as_ref().map_or(0.0, |near_field| {
+            let depth = |(flight, grain): (&Flight, &Grain)| {
+                let potential = near_field.law().potential(2.0 * flight.radius) * grain.strength.powi(2);
+                potential.abs() / grain.mass
+            };
+            self.flights.iter().zip(&self.grains).map(depth).fold(0.0, f64::max)
+        });
+        // m/2 v²/2 = depth for two of equal mass.
+        (fastest * fastest + 2.0 * fall + 4.0 * drawn).sqrt()
+    }
+
     /// Looks around from where [`flights`](Self::flights) are now, `after` seconds into the step: then [`pairs`](Self::pairs) and
     /// [`at_surface`](Self::at_surface) name all that are nearer to each other than `reach` (m). Cheap as long as lists hold.
     pub fn look(&mut self, after: f64, reach: f64) {
@@ -276,6 +300,12 @@ impl Crowd {
             collision.normal = -collision.normal;
         }
         observer.grain_collision(&collision);
+    }
+
+    /// Whether a grain may begin a contact with the surface: where grains hit once, not after that.
+    #[must_use]
+    pub fn may_hit(&self, slot: u32) -> bool {
+        !self.once_only || self.grains[slot as usize].hits == 0
     }
 
     /// Notes that the grain in `slot` hits the surface, and tells its hit order.
