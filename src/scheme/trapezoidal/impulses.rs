@@ -1,6 +1,7 @@
 //! The contacts of one step and their impulses.
 
 use impinge_events::SurfaceContact;
+use impinge_events::contact_time::APPROACH_ROUNDING;
 use nalgebra::Vector3;
 use rustc_hash::FxHashSet;
 
@@ -63,7 +64,8 @@ impl Impulses {
             let Some(near) = crowd.near(pair, 0.0) else { continue };
             let before = pair.map(|slot| crowd.body(slot));
             let contact = resolve_pair(&crowd.laws().grain, &before[0], &before[1], near.normal);
-            if contact.approach_speed > 0.0 && self.met.insert(pair) && !crowd.shields(pair) {
+            let speeds = before[0].velocity.amax() + before[1].velocity.amax();
+            if approaches(contact.approach_speed, speeds) && self.met.insert(pair) && !crowd.shields(pair) {
                 (0..2).for_each(|k| self.add(pair[k], &before[k], &contact.after[k]));
                 crowd.tell_pair_impulse(pair, &near, &contact, after, observer);
             }
@@ -81,7 +83,8 @@ impl Impulses {
             for k in 0..self.found.len() {
                 let (element, contact) = self.found[k];
                 let resolved = resolve_surface(&crowd.laws().surface, &before, contact.normal, contact.velocity);
-                if resolved.approach_speed > 0.0 && crowd.may_hit(slot) {
+                let speeds = before.velocity.amax() + contact.velocity.amax();
+                if approaches(resolved.approach_speed, speeds) && crowd.may_hit(slot) {
                     self.met.insert([slot, SURFACE]);
                     self.add(slot, &before, &resolved.after);
                     crowd.tell_surface_impulse(slot, (element, contact), &before, &resolved, after, observer);
@@ -106,4 +109,10 @@ impl Impulses {
             crowd.grains[slot as usize].spin += jump.spin;
         }
     }
+}
+
+/// Whether a normal speed of approach (m/s) is more than the rounding of the speeds that it is the difference of: grains that e = 0 has stopped
+/// against each other would go on colliding as long as they overlap.
+fn approaches(approach: f64, speeds: f64) -> bool {
+    approach > APPROACH_ROUNDING * speeds
 }

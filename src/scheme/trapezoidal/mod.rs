@@ -34,7 +34,7 @@
 //! near field nothing but contacts can change from one sweep to the next, and it ends when there is no new one. The near field at the end of a
 //! step is taken for that at the beginning of the next, which it is up to the tolerance.
 //!
-//! **What it cannot do.** A grain that rests on the surface under gravity sinks, by up to h g in each second: nothing but an approach gives an
+//! **What it cannot do.** A grain that rests on the surface under gravity g sinks, at up to g h: nothing but an approach gives an
 //! impulse, and nothing takes an overlap back. Grains that fly farther than they are large in a step pass through each other. Both go to 0 with
 //! h. The paper says as much: it is for flows of short contacts.
 
@@ -52,8 +52,8 @@ use crate::scene;
 /// Of its radius a grain flies in a step whose length is not given, at the fastest impact of the scene: overlaps stay below that.
 const PART_OF_RADIUS: f64 = 0.05;
 
-/// Sweeps after which a step has no hope of converging: with a near field each takes the same part off the error, and a hundred would bring
-/// even a slow 0.9 to 1e-5; contacts that are found one after the other are a handful.
+/// Sweeps after which a step has no hope of converging: with a near field each takes the same part off the error, and 200 bring it to 1e-9 even
+/// where that part is a tenth; contacts that are found one after the other are a handful.
 const MOST_SWEEPS: u32 = 1000;
 
 /// Steps of the phi-method.
@@ -135,7 +135,8 @@ impl Trapezoidal {
             let before = (crowd.flights[slot].position, self.velocity[slot]);
             self.place(crowd, slot, step);
             let flight = &crowd.flights[slot];
-            change.note([before.0, flight.position, self.start[slot]], [before.1, self.velocity[slot], flight.velocity]);
+            change
+                .note([before.0, flight.position, self.start[slot]], [before.1, self.velocity[slot], flight.velocity]);
         }
         change
     }
