@@ -67,6 +67,7 @@ pub(super) fn run(args: &Args) -> Result<Ending, Failure> {
                 Broken::Singular { .. } => {
                     "shorten the sub-step, or give grains that attract each other a radius that keeps them apart"
                 }
+                Broken::Unconverged { .. } => "shorten the step: forces change too much within it",
                 Broken::OutOfPlane { .. } => "give the scene a surface that does not change along y",
                 Broken::Overlap { allowed, .. } if allowed == LARGEST_OVERLAP_WITH_FORCES => {
                     "take a shorter `substep` or a smaller `run.penetration`: the overlap of grains under unequal forces goes with the square of the sub-step"

@@ -41,11 +41,13 @@ impl Default for FixedPoint {
 #[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct Trapezoidal {
-    /// Length of a step, s; left out, that in which the fastest grain flies 0.05 radii.
+    /// Length of a step, s; left out, that in which grains at the fastest impact of the scene fly 0.05 radii of the smallest. Steps are evened out
+    /// to end at samples and frames.
     pub step: Option<f64>,
     /// phi: weight of the end of a step, 0 (explicit) to 1 (implicit); 1/2 is the trapezoidal rule.
     pub phi: f64,
-    /// Relative change between two iterations, below which a step is accepted.
+    /// Change between two iterations over the change since the beginning of the step, for velocities and for positions, below which a step is
+    /// accepted. Without a near field the iteration is exact, and this has no effect.
     pub tolerance: f64,
 }
 

@@ -7,6 +7,7 @@ pub mod soft_sphere;
 pub mod stepped;
 mod substep;
 mod timetable;
+pub mod trapezoidal;
 
 pub use event_driven::{AtRest, EventDriven, Held, LARGEST_OVERLAP, LARGEST_OVERLAP_WITH_FORCES, Laws};
 pub use substep::{Forces, Length, STEPS_PER_CHECK, SubSteps, Substepped};
@@ -69,6 +70,14 @@ pub enum Broken {
         time: f64,
         /// Ids of the grains.
         grains: Vec<u64>,
+    },
+    /// A step of an implicit scheme does not converge.
+    #[error("at t = {time} s a step does not converge in {iterations} iterations")]
+    Unconverged {
+        /// Simulated time, s.
+        time: f64,
+        /// Iterations that were tried.
+        iterations: u32,
     },
     /// A velocity is no finite number.
     #[error("at t = {time} s the velocity of grain {} is no finite number", list(grains))]

@@ -1,43 +1,48 @@
 //! Which of the time-stepped schemes runs.
 
 use super::{Crowd, Method};
-use crate::scene::{Invalid, Scene, Scheme, Source};
+use crate::scene::{Scene, Scheme, Source};
+use crate::scheme::fixed_point::FixedPoint;
 use crate::scheme::soft_sphere::SoftSphere;
+use crate::scheme::trapezoidal::Trapezoidal;
 use crate::scheme::{Broken, Observer};
 
 /// One of the time-stepped schemes; the choice is made once a step.
 #[derive(Clone, Debug)]
 pub enum Comparator {
+    /// Contacts are impulses, and steps are shortened so that none is missed.
+    FixedPoint(Box<FixedPoint>),
+    /// The phi-method, with contacts as impulses.
+    Trapezoidal(Trapezoidal),
     /// Contacts are forces.
     SoftSphere(SoftSphere),
 }
 
 impl Comparator {
-    /// The scheme that `scene` asks for, for `crowd` as it starts.
-    ///
-    /// # Errors
-    /// A scheme that is not there yet.
-    pub fn new(scene: &Scene, crowd: &Crowd) -> Result<Self, Invalid> {
+    /// The scheme that `scene` asks for, for `crowd` as it starts; `None` if that is the event-driven one.
+    #[must_use]
+    pub fn new(scene: &Scene, crowd: &Crowd) -> Option<Self> {
+        let fastest = || fastest_nozzle(scene).max(crowd.fastest_impact());
         match scene.run.scheme {
-            Scheme::SoftSphere => {
-                let fastest = fastest_nozzle(scene).max(crowd.fastest_impact());
-                Ok(Self::SoftSphere(SoftSphere::new(&scene.soft_sphere.unwrap_or_default(), crowd, fastest)))
+            Scheme::EventDriven => None,
+            Scheme::FixedPoint => {
+                Some(Self::FixedPoint(Box::new(FixedPoint::new(scene.fixed_point.unwrap_or_default()))))
             }
-            other => Err(Invalid::new(
-                "run.scheme",
-                format!("the scheme \"{}\" is not in this version", other.name()),
-                "use `scheme = \"event-driven\"`, or leave it out",
-            )),
+            Scheme::Trapezoidal => {
+                Some(Self::Trapezoidal(Trapezoidal::new(&scene.trapezoidal.unwrap_or_default(), fastest())))
+            }
+            Scheme::SoftSphere => {
+                Some(Self::SoftSphere(SoftSphere::new(&scene.soft_sphere.unwrap_or_default(), crowd, fastest())))
+            }
         }
     }
-}
 
-impl Comparator {
     /// The length of its steps (s) where it is known beforehand.
     #[must_use]
     pub fn planned_step(&self) -> Option<f64> {
         match self {
             Self::SoftSphere(scheme) => Some(scheme.longest_step()).filter(|step| step.is_finite()),
+            Self::FixedPoint(_) | Self::Trapezoidal(_) => None,
         }
     }
 }
@@ -54,18 +59,24 @@ fn fastest_nozzle(scene: &Scene) -> f64 {
 impl Method for Comparator {
     fn step(&mut self, crowd: &mut Crowd, room: f64, observer: &mut impl Observer) -> Result<f64, Broken> {
         match self {
+            Self::FixedPoint(scheme) => scheme.step(crowd, room, observer),
+            Self::Trapezoidal(scheme) => scheme.step(crowd, room, observer),
             Self::SoftSphere(scheme) => scheme.step(crowd, room, observer),
         }
     }
 
     fn renumber(&mut self, crowd: &mut Crowd, slots: &[u32], observer: &mut impl Observer) {
         match self {
+            Self::FixedPoint(scheme) => scheme.renumber(crowd, slots, observer),
+            Self::Trapezoidal(scheme) => scheme.renumber(crowd, slots, observer),
             Self::SoftSphere(scheme) => scheme.renumber(crowd, slots, observer),
         }
     }
 
     fn finish(&mut self, crowd: &mut Crowd, observer: &mut impl Observer) {
         match self {
+            Self::FixedPoint(scheme) => scheme.finish(crowd, observer),
+            Self::Trapezoidal(scheme) => scheme.finish(crowd, observer),
             Self::SoftSphere(scheme) => scheme.finish(crowd, observer),
         }
     }
