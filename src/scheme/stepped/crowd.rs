@@ -165,16 +165,25 @@ impl Crowd {
     /// Looks around from where [`flights`](Self::flights) are now, `after` seconds into the step: then [`pairs`](Self::pairs) and
     /// [`at_surface`](Self::at_surface) name all that are nearer to each other than `reach` (m). Cheap as long as lists hold.
     pub fn look(&mut self, after: f64, reach: f64) {
-        let now = self.clock + after;
+        self.look_for_grains(self.clock + after, after, reach);
+        self.look_for_surface(self.clock + after, after, reach);
+    }
+
+    /// The same at the beginning of a step that may be as long as `step` (s), with a reach (m) of its own for the surface.
+    pub fn look_ahead(&mut self, step: f64, reach: f64, surface_reach: f64) {
+        self.look_for_grains(self.clock, step, reach);
+        self.look_for_surface(self.clock, 0.0, surface_reach);
+    }
+
+    fn look_for_grains(&mut self, now: f64, step: f64, reach: f64) {
         let Self { flights, neighbours, domain, .. } = self;
         if self.laws.interference != Interference::None {
             let drifted = neighbours.drifted(now);
             let holds = |(slot, flight): (usize, &Flight)| neighbours.holds(slot, flight.position, drifted, domain);
             if !(neighbours.suits(flights.len(), reach) && flights.iter().enumerate().all(holds)) {
-                neighbours.make(flights, domain, now, reach, after);
+                neighbours.make(flights, domain, now, reach, step);
             }
         }
-        self.look_for_surface(now, after, reach);
     }
 
     fn look_for_surface(&mut self, now: f64, after: f64, reach: f64) {
@@ -278,6 +287,12 @@ impl Crowd {
         observer.grain_collision(&collision);
     }
 
+    /// Whether a grain may begin a contact with the surface: where grains hit once, not after that.
+    #[must_use]
+    pub fn may_hit(&self, slot: u32) -> bool {
+        !self.once_only || self.grains[slot as usize].hits == 0
+    }
+
     /// Notes that the grain in `slot` hits the surface, and tells its hit order.
     pub fn count_hit(&mut self, slot: u32) -> u32 {
         let grain = &mut self.grains[slot as usize];
@@ -320,7 +335,8 @@ impl Crowd {
     }
 
     /// Whether forces act at all.
-    pub(super) fn has_forces(&self) -> bool {
+    #[must_use]
+    pub fn has_forces(&self) -> bool {
         self.forces.gravity != Vector3::zeros() || self.has_near_field()
     }
 
