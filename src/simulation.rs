@@ -242,9 +242,9 @@ impl Advance {
     fn new(scene: &Scene, placed: &Placed, surface: Surface) -> Result<Self, Invalid> {
         let (laws, domain) = (laws(scene)?, domain(scene));
         let forces = forces(scene, placed.grains.len() as u64)?;
-        if scene.run.scheme != scene::Scheme::EventDriven {
+        if let Some(comparator) = Comparator::called(scene.run.scheme) {
             let crowd = Crowd::new(&placed.grains, surface, domain, laws, forces, scene.run.start);
-            let comparator = Comparator::new(scene, &crowd)?;
+            let comparator = comparator(scene, &crowd);
             return Ok(Self::Stepped(Box::new(Stepped::new(crowd, comparator))));
         }
         let engine = EventDriven::new(&placed.grains, surface, domain, laws, scene.run.start);

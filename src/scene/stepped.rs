@@ -15,19 +15,23 @@ const STEP_FRACTION_MIN: f64 = 1e-6;
 /// Largest step over the Hertz contact time: above it a contact has fewer than four steps, and energy comes from nowhere.
 const STEP_FRACTION_MAX: f64 = 0.25;
 
+/// Smallest tolerance of an iteration: below it, what an iteration changes is rounding.
+const TOLERANCE_MIN: f64 = 1e-12;
+
 /// `[fixed_point]`: the staggered scheme of Arbelaez et al. (2009), section 4, with `run.scheme = "fixed-point"`.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct FixedPoint {
-    /// TOL: relative change of the positions between two iterations, below which a step is accepted.
+    /// TOL: what an iteration changes, over what grains move in the step, below which the step is accepted; 1e-12 to 1. It has an effect only
+    /// where a near field acts.
     pub tolerance: f64,
-    /// k_d: iterations that a step should take; its length is changed so that it does.
+    /// k_d: iterations that a step should take and may take; its length is changed so that it does.
     pub iterations: u32,
-    /// eta: safety factor on each new length of a step; above 0, at most 1.
+    /// eta: safety factor on each new length of a step, that of the iteration and the time to a predicted collision; above 0, at most 1.
     pub safety: f64,
-    /// gamma: largest overlap over the radius that a step may leave.
+    /// gamma: overlap over the radius that a step beyond a predicted collision may leave. Where no force acts, errors are proportional to it.
     pub overlap: f64,
-    /// Longest step, s; left out, as long as the iteration allows.
+    /// Longest step, s; left out, as long as iteration and predicted collisions allow. Under gravity alone only collisions shorten steps.
     pub largest_step: Option<f64>,
 }
 
@@ -116,6 +120,10 @@ fn belongs(scene: &Scene, table: &str, given: bool, scheme: Scheme) -> Checked {
 
 fn fixed_point(table: &FixedPoint) -> Checked {
     part("fixed_point.tolerance", table.tolerance)?;
+    if table.tolerance < TOLERANCE_MIN {
+        let what = format!("{:e} is below {TOLERANCE_MIN:e}, the rounding of an iteration", table.tolerance);
+        return Err(Invalid::new("fixed_point.tolerance", what, "1e-6 is usual"));
+    }
     if table.iterations == 0 {
         let what = "a step needs one iteration at least";
         return Err(Invalid::new("fixed_point.iterations", what, "give a whole number above 0; 5 is usual"));

@@ -1,6 +1,7 @@
 //! Ways to advance time, and what each of them reports to its observers.
 
 mod event_driven;
+pub mod fixed_point;
 mod penetration;
 mod resting;
 pub mod soft_sphere;

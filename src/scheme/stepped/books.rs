@@ -88,7 +88,8 @@ impl Crowd {
     }
 
     /// Whether forces act at all.
-    pub(super) fn has_forces(&self) -> bool {
+    #[must_use]
+    pub fn has_forces(&self) -> bool {
         self.forces.gravity != Vector3::zeros() || self.has_near_field()
     }
 

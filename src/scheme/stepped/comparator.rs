@@ -19,21 +19,21 @@ pub enum Comparator {
 }
 
 impl Comparator {
-    /// The scheme that `scene` asks for, for `crowd` as it starts; `None` if that is the event-driven one.
+    /// How the comparator called `scheme` is made for a scene and its crowd as it starts; `None` for the event-driven scheme, which has no crowd.
     #[must_use]
-    pub fn new(scene: &Scene, crowd: &Crowd) -> Option<Self> {
-        let fastest = || fastest_nozzle(scene).max(crowd.fastest_impact());
-        match scene.run.scheme {
+    pub fn called(scheme: Scheme) -> Option<fn(&Scene, &Crowd) -> Self> {
+        match scheme {
             Scheme::EventDriven => None,
             Scheme::FixedPoint => {
-                Some(Self::FixedPoint(Box::new(FixedPoint::new(scene.fixed_point.unwrap_or_default()))))
+                Some(|scene, _| Self::FixedPoint(Box::new(FixedPoint::new(scene.fixed_point.unwrap_or_default()))))
             }
-            Scheme::Trapezoidal => {
-                Some(Self::Trapezoidal(Trapezoidal::new(&scene.trapezoidal.unwrap_or_default(), fastest())))
-            }
-            Scheme::SoftSphere => {
-                Some(Self::SoftSphere(SoftSphere::new(&scene.soft_sphere.unwrap_or_default(), crowd, fastest())))
-            }
+            Scheme::Trapezoidal => Some(|scene, crowd| {
+                Self::Trapezoidal(Trapezoidal::new(&scene.trapezoidal.unwrap_or_default(), fastest(scene, crowd)))
+            }),
+            Scheme::SoftSphere => Some(|scene, crowd| {
+                let fastest = fastest(scene, crowd);
+                Self::SoftSphere(SoftSphere::new(&scene.soft_sphere.unwrap_or_default(), crowd, fastest))
+            }),
         }
     }
 
@@ -47,13 +47,13 @@ impl Comparator {
     }
 }
 
-/// Speed of the fastest grains that nozzles will send, m/s.
-fn fastest_nozzle(scene: &Scene) -> f64 {
+/// Speed of the fastest impact that `crowd` or the nozzles of `scene` can have, m/s.
+fn fastest(scene: &Scene, crowd: &Crowd) -> f64 {
     let speed = |source: &Source| match source {
         Source::Nozzle(nozzle) => nozzle.speed,
         _ => 0.0,
     };
-    scene.source.iter().map(speed).fold(0.0, f64::max)
+    scene.source.iter().map(speed).fold(crowd.fastest_impact(), f64::max)
 }
 
 impl Method for Comparator {

@@ -165,12 +165,21 @@ impl Crowd {
     /// Looks around from where [`flights`](Self::flights) are now, `after` seconds into the step: then [`pairs`](Self::pairs) and
     /// [`at_surface`](Self::at_surface) name all that are nearer to each other than `reach` (m). Cheap as long as lists hold.
     pub fn look(&mut self, after: f64, reach: f64) {
-        let now = self.clock + after;
+        self.look_for_grains(self.clock + after, after, reach);
+        self.look_for_surface(self.clock + after, after, reach);
+    }
+
+    /// The same at the beginning of a step that may be as long as `step` (s), with a reach (m) of its own for the surface.
+    pub fn look_ahead(&mut self, step: f64, reach: f64, surface_reach: f64) {
+        self.look_for_grains(self.clock, step, reach);
+        self.look_for_surface(self.clock, 0.0, surface_reach);
+    }
+
+    fn look_for_grains(&mut self, now: f64, step: f64, reach: f64) {
         let Self { flights, neighbours, domain, .. } = self;
         if self.laws.interference != Interference::None && !neighbours.holds(flights, domain, now, reach) {
-            neighbours.make(flights, domain, now, reach, after);
+            neighbours.make(flights, domain, now, reach, step);
         }
-        self.look_for_surface(now, after, reach);
     }
 
     fn look_for_surface(&mut self, now: f64, after: f64, reach: f64) {
