@@ -29,6 +29,7 @@ pub mod scene;
 pub mod scheme;
 pub mod simulation;
 pub mod source;
+pub mod study;
 mod sum;
 pub mod surface;
 

@@ -11,8 +11,8 @@ use tempfile::TempDir;
 
 use super::Error;
 
-/// Every name that a run may write; a folder with anything else in it is never replaced.
-const NAMES: [&str; 12] = [
+/// Every name that a run or a study may write; a folder with anything else in it is never replaced.
+const NAMES: [&str; 15] = [
     "summary.json",
     "grains.csv",
     "events.csv",
@@ -25,6 +25,9 @@ const NAMES: [&str; 12] = [
     "jet_side.svg",
     "energy_by_hit_order.svg",
     "impacts.svg",
+    "verdict.md",
+    "tables",
+    "pictures",
 ];
 
 /// A folder of results in the making.

@@ -10,7 +10,11 @@ use crate::observe::{History, SurfaceEnergy};
 use crate::scheme::{GrainCollision, Observer, SurfaceHit};
 
 /// Writes a header and rows.
-fn table<R: Serialize>(out: &mut dyn Write, header: &[&str], rows: impl Iterator<Item = R>) -> io::Result<()> {
+pub(super) fn table<R: Serialize>(
+    out: &mut dyn Write,
+    header: &[&str],
+    rows: impl Iterator<Item = R>,
+) -> io::Result<()> {
     let mut table = csv::WriterBuilder::new().has_headers(false).from_writer(out);
     table.write_record(header).map_err(cause)?;
     for row in rows {

@@ -1,0 +1,3 @@
+//! Parameter studies: many runs, what they say together, and how sure that is.
+
+pub mod reproduce;
