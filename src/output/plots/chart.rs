@@ -10,8 +10,8 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
 use super::{
-    Area, BLUE, Drawn, FAINT, FINE, GREEN, HEADING, INK, MUTED, ORANGE, PURPLE, SKY, colour_bar, colour_of, fine, part,
-    picture, style, tick, write,
+    Area, BLUE, Drawn, FAINT, FINE, FRAME, GREEN, HEADING, INK, MUTED, ORANGE, PURPLE, SKY, colour_bar, colour_of,
+    fine, part, picture, style, tick, write,
 };
 use crate::study::reproduce::{Axis, Line, Map, Mark, Picture, Scale};
 
@@ -119,20 +119,19 @@ fn axes<'a>(area: &Area<'a>, x: &Axis, y: &Axis, lines: bool) -> Drawn<Plane<'a>
 }
 
 fn draw_line(plane: &mut Plane<'_>, line: &Line, y: &Axis) -> Drawn {
-    let colour = COLOURS[line.colour % COLOURS.len()];
-    let stroke = colour.stroke_width(fine(2));
+    let (colour, stroke) = stroke(line);
     let clip = |value: f64| value.clamp(y.range[0], y.range[1]);
     // What lies outside is not drawn: it would lie on the frame.
     let inside = |value: f64| (y.range[0]..=y.range[1]).contains(&value);
     for piece in line.points.split(|(_, at)| !inside(at.value)).filter(|piece| !piece.is_empty()) {
         let path: Vec<(f64, f64)> = piece.iter().map(|(x, at)| (*x, at.value)).collect();
-        if matches!(line.mark, Mark::Points | Mark::Curve) {
-            plane.draw_series(LineSeries::new(path, stroke))?;
-        } else {
+        if matches!(line.mark, Mark::OpenPoints | Mark::Dashed) {
             plane.draw_series(DashedLineSeries::new(path, fine(6), fine(4), stroke))?;
+        } else {
+            plane.draw_series(LineSeries::new(path, stroke))?;
         }
     }
-    if matches!(line.mark, Mark::Curve | Mark::Dashed) {
+    if !matches!(line.mark, Mark::Points | Mark::OpenPoints) {
         return Ok(());
     }
     for (x, at) in line.points.iter().filter(|(_, at)| inside(at.value)) {
@@ -148,18 +147,26 @@ fn draw_line(plane: &mut Plane<'_>, line: &Line, y: &Axis) -> Drawn {
     Ok(())
 }
 
+/// Colour and stroke of a line.
+fn stroke(line: &Line) -> (RGBColor, ShapeStyle) {
+    match line.mark {
+        Mark::Guide => (FRAME, FRAME.stroke_width(fine(1))),
+        _ => (COLOURS[line.colour % COLOURS.len()], COLOURS[line.colour % COLOURS.len()].stroke_width(fine(2))),
+    }
+}
+
 /// The key, in the order of the lines.
 fn draw_key(area: &Area<'_>, lines: &[Line]) -> Drawn {
-    for (row, line) in lines.iter().enumerate() {
+    for (row, line) in lines.iter().filter(|line| !line.name.is_empty()).enumerate() {
         let (x, y) = (KEY, HEADING + 24 + 24 * row as i32);
-        let colour = COLOURS[line.colour % COLOURS.len()];
+        let (colour, stroke) = stroke(line);
         let pieces: &[[i32; 2]] = match line.mark {
-            Mark::Points | Mark::Curve => &[[0, 24]],
+            Mark::Points | Mark::Curve | Mark::Guide => &[[0, 24]],
             Mark::OpenPoints | Mark::Dashed => &[[0, 6], [10, 15], [19, 24]],
         };
         for ends in pieces {
             let ends = ends.map(|end| ((x + end) * FINE, y * FINE));
-            area.draw(&PathElement::new(ends, colour.stroke_width(fine(2))))?;
+            area.draw(&PathElement::new(ends, stroke))?;
         }
         if matches!(line.mark, Mark::Points | Mark::OpenPoints) {
             area.draw(&Circle::new(((x + 12) * FINE, y * FINE), fine(4), colour.filled()))?;

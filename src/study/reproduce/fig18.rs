@@ -89,17 +89,18 @@ fn test_removal(removed: &[&Copies], report: &mut Report) {
         format!("{measured}"),
         measured.deviation(Estimate::exact(expected)) < DEVIATIONS,
     );
-    let (low, all) = (fit(removed, FIT), fit(removed, u64::MAX));
+    let low = fit(removed, FIT);
+    let most = last.jet.grains;
     report.put_to_the_test(
         "Grains removed on their first collision: E / E0 = exp(-C N)",
         format!(
-            "C = {} per grain up to {FIT} grains, where it misses E by up to {:.0} %; up to {} grains by a factor of up to {:.0e}. Flux enters as \
-             ln(E / E0) = -C N only while few grains collide: with N the number of hits rises to {}, and E falls as 1 / N",
+            "C = {} per grain up to {FIT} grains, but even there it misses E by up to {:.0} %. With {most} grains it gives {:.1e}, and {} of E0 \
+             arrives: what has hit shields a disc for good, the number of hits rises to {} only, and E falls as 1 / N",
             low.slope * -1.0,
             100.0 * misfit(removed, &low, FIT),
-            last.jet.grains,
-            1.0 / (1.0 - misfit(removed, &all, u64::MAX)).max(1e-9),
-            last.mean(|energies| energies.hit) * last.jet.grains as f64,
+            (low.slope.value * most as f64).exp(),
+            carried(last),
+            last.mean(|energies| energies.hit) * most as f64,
         ),
         misfit(removed, &low, FIT) < CLOSE,
     );
@@ -168,7 +169,7 @@ fn chart(models: &[Vec<&Copies>; 3]) -> Chart {
         let slope = fit(copies, FIT).slope.value;
         let curve =
             (0..=200).map(|step| 2.0 * 4000.0_f64.powf(f64::from(step) / 200.0)).map(|n| (n, (slope * n).exp()));
-        lines.push(Line::curve("  exponential of few grains", colour, Mark::Dashed, curve));
+        lines.push(Line::curve("  exponential fitted to few", colour, Mark::Dashed, curve));
     }
     Chart {
         name: "carried",

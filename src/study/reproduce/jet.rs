@@ -182,10 +182,15 @@ impl Copies {
         Estimate::mean(&self.energies.iter().map(of).collect::<Vec<_>>())
     }
 
-    /// What another model, run with the same grains, makes of a quantity: its mean over that of these copies, less 1.
-    pub(super) fn error_of(&self, model: &Self, of: impl Fn(&Energies) -> f64) -> Estimate {
+    /// What a model says that was run with the same grains, over what is true of these copies.
+    pub(super) fn ratio_of(
+        &self,
+        model: &Self,
+        says: impl Fn(&Energies) -> f64,
+        of: impl Fn(&Energies) -> f64,
+    ) -> Estimate {
         let pairs = model.energies.iter().zip(&self.energies);
-        Estimate::ratio(&pairs.map(|(model, truth)| (of(model), of(truth))).collect::<Vec<_>>()) + -1.0
+        Estimate::ratio(&pairs.map(|(model, truth)| (says(model), of(truth))).collect::<Vec<_>>())
     }
 }
 

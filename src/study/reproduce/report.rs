@@ -161,7 +161,7 @@ pub struct Chart {
 /// One line of a chart.
 #[derive(Clone, Debug)]
 pub struct Line {
-    /// What the key calls it.
+    /// What the key calls it; one without a name is not in the key.
     pub name: String,
     /// Places x and values with their standard errors (0: no bar).
     pub points: Vec<(f64, super::Estimate)>,
@@ -202,6 +202,8 @@ pub enum Mark {
     Curve,
     /// A dashed line.
     Dashed,
+    /// A thin grey line, to read the others by.
+    Guide,
 }
 
 /// Colours over a plane: equal cells.

@@ -118,13 +118,13 @@ impl Slope {
     }
 }
 
-/// Where |y| rises through `level` for good: between the last point below it and the next, by a straight line over ln x.
+/// Where |y| first rises through `level`: between the first point that reaches it and the one before, by a straight line over ln x.
 ///
-/// `points` are in the order of x > 0. None where |y| is not below the level anywhere, or at the last point.
+/// `points` are in the order of x > 0. None where |y| reaches the level at the first point already, or nowhere.
 #[must_use]
 pub fn crossing(points: &[(f64, Estimate)], level: f64) -> Option<Estimate> {
-    let below = points.iter().rposition(|(_, y)| y.value.abs() < level)?;
-    let [(x0, y0), (x1, y1)] = [points[below], *points.get(below + 1)?];
+    let reached = points.iter().position(|(_, y)| y.value.abs() >= level)?;
+    let [(x0, y0), (x1, y1)] = [*points.get(reached.checked_sub(1)?)?, points[reached]];
     let [low, high] = [y0, y1].map(|y| y.value.abs());
     let part = (level - low) / (high - low);
     let x = x0 * (x1 / x0).powf(part);
@@ -178,7 +178,7 @@ mod tests {
     #[test]
     fn a_level_is_crossed_where_the_line_says() {
         let at = |x, value| (x, Estimate { value, error: 0.001 });
-        let points = [at(1.0, 0.02), at(10.0, -0.01), at(100.0, -0.03), at(1000.0, -0.5)];
+        let points = [at(1.0, 0.002), at(10.0, -0.01), at(100.0, -0.03), at(1000.0, 0.5), at(10_000.0, 0.0)];
         let crossed = crossing(&points, 0.02).expect("it is");
         approx::assert_relative_eq!(crossed.value, 10.0 * 10.0_f64.sqrt(), max_relative = 1e-13);
         approx::assert_relative_eq!(

@@ -25,12 +25,17 @@ pub(super) const STUDY: Study = Study {
     compute,
 };
 
-/// Mass of grain 2 over that of grain 1, and the name of its map.
-const RATIOS: [(f64, &str); 3] = [(1.0, "hits_equal"), (4.0, "hits_heavy_outer"), (0.25, "hits_light_outer")];
+/// Mass of grain 2 over that of grain 1, what that is called, and its map.
+const RATIOS: [(f64, &str, &str); 3] = [
+    (1.0, "equal masses", "hits_equal"),
+    (4.0, "m2 = 4 m1", "hits_heavy_outer"),
+    (0.25, "m2 = m1 / 4", "hits_light_outer"),
+];
 /// Restitutions along each side of the square, and the same for a quick study.
 const GRID: [u32; 2] = [40, 20];
-/// The same for pictures, which need no engine.
+/// The same for pictures, which need no engine and show what is at the middles of their cells.
 const FINE_GRID: u32 = 100;
+const MIDDLE: f64 = 0.5;
 /// Velocities and energies may differ by so much, over v0 and E0: rounding of some hundred hits.
 const ROUNDING: f64 = 1e-12;
 /// How far the faster grain flies between two looks, m. It grows in time as a collapsing pair slows down, to 1e270 s and beyond.
@@ -59,22 +64,23 @@ fn compute(settings: &Settings<'_>) -> Result<Report, Error> {
             "surface_energy_engine",
         ],
     );
-    for (index, (ratio, name)) in RATIOS.into_iter().enumerate() {
+    for (index, (ratio, masses, name)) in RATIOS.into_iter().enumerate() {
         if (settings.watch)(index as f64 / RATIOS.len() as f64).is_break() {
             return Err(Error::BrokenOff);
         }
-        let square: Vec<Sequence> = square(count, ratio).collect();
+        let square: Vec<Sequence> = square(count, 0.0, ratio).collect();
         let played = square.par_iter().map(play).collect::<Result<Vec<_>, _>>()?;
-        put_to_the_test(ratio, &square, &played, &mut report);
+        put_to_the_test(masses, &square, &played, &mut report);
         square.iter().zip(&played).for_each(|(sequence, played)| row(&mut table, sequence, played));
-        report.pictures.push(Picture::Map(map_of_hits(ratio, name)));
+        report.pictures.push(Picture::Map(map_of_hits(ratio, masses, name)));
     }
     report.tables.push(table);
     Ok(report)
 }
 
-fn square(count: u32, ratio: f64) -> impl Iterator<Item = Sequence> {
-    let at = move |index: u32| f64::from(index) / f64::from(count);
+/// Restitutions 1, 2 ... `count` over `count`, less so many steps.
+fn square(count: u32, less: f64, ratio: f64) -> impl Iterator<Item = Sequence> {
+    let at = move |index: u32| (f64::from(index) - less) / f64::from(count);
     (0..count.pow(2)).map(move |index| Sequence {
         s: at(index / count + 1),
         q: at(index % count + 1),
@@ -153,7 +159,7 @@ fn play(sequence: &Sequence) -> Result<Played, Error> {
     })
 }
 
-fn put_to_the_test(ratio: f64, square: &[Sequence], played: &[Played], report: &mut Report) {
+fn put_to_the_test(masses: &str, square: &[Sequence], played: &[Played], report: &mut Report) {
     let pairs = || square.iter().zip(played);
     let mismatches = pairs().filter(|(sequence, played)| !played.agrees(sequence)).count();
     let collapses = square.iter().filter(|sequence| sequence.collapses()).count();
@@ -161,14 +167,14 @@ fn put_to_the_test(ratio: f64, square: &[Sequence], played: &[Played], report: &
     let most = square.iter().filter_map(Sequence::grain_hits).max().unwrap_or(0);
     report.put_to_the_test(
         format!(
-            "m2 = {ratio} m1: the engine hits as often as the closed form, at all {} points that do not collapse",
+            "{masses}: the engine hits as often as the closed form, at all {} points that do not collapse",
             square.len() - collapses
         ),
         format!("{mismatches} mismatches; up to {most} grain-grain hits; {collapses} points collapse"),
         mismatches == 0,
     );
     report.put_to_the_test(
-        format!("m2 = {ratio} m1: final velocities and energy to the surface are those of the closed form, collapse included"),
+        format!("{masses}: final velocities and energy to the surface are those of the closed form, collapse included"),
         format!("largest difference {deviation:.1e} of v0 or E0 at {} points", square.len()),
         deviation < ROUNDING,
     );
@@ -191,11 +197,11 @@ fn row(table: &mut Table, sequence: &Sequence, played: &Played) {
     ]);
 }
 
-fn map_of_hits(ratio: f64, name: &'static str) -> Map {
-    let hits: Vec<Option<f64>> = square(FINE_GRID, ratio).map(|at| at.grain_hits().map(f64::from)).collect();
+fn map_of_hits(ratio: f64, masses: &str, name: &'static str) -> Map {
+    let hits: Vec<Option<f64>> = square(FINE_GRID, MIDDLE, ratio).map(|at| at.grain_hits().map(f64::from)).collect();
     Map {
         name,
-        title: format!("How often two grains in front of a wall hit each other: m2 = {ratio} m1"),
+        title: format!("How often two grains in front of a wall hit each other: {masses}"),
         shows: "Grain-grain hits until the end; 10 stands for more too".into(),
         x: Axis::linear("restitution of the surface", 0.0, 1.0),
         y: Axis::linear("restitution between grains", 0.0, 1.0),
@@ -215,8 +221,8 @@ mod tests {
 
     #[test]
     fn the_engine_plays_the_closed_form_on_a_coarse_square() {
-        for (ratio, _) in RATIOS {
-            for sequence in square(10, ratio) {
+        for (ratio, ..) in RATIOS {
+            for sequence in square(10, 0.0, ratio) {
                 let played = play(&sequence).expect("it runs");
                 assert!(played.agrees(&sequence) && played.deviation(&sequence) < ROUNDING, "{sequence:?}");
             }
