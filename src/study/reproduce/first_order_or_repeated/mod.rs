@@ -239,25 +239,21 @@ fn limit(errors: &[(f64, Estimate)], level: f64) -> String {
 fn tell_shapes(shapes: &[Series], report: &mut Report) {
     for series in shapes {
         let jet = &series[0][0].jet;
-        let measured = LEVELS.map(|level| {
-            let Some(limit) = crossing(&errors(series, 1, CARRIED), level) else {
-                return format!("{:.0} % nowhere", 100.0 * level);
-            };
-            let [crowding, shielding] =
-                [jet.crowding(), jet.shielding(0.5 * jet.width)].map(|of| of / jet.grains as f64);
-            format!(
-                "{:.0} % from crowding pi d^2 N / A = {} (shielding exponent over half the width {}) on",
-                100.0 * level,
-                limit * crowding,
-                limit * shielding
+        let [crowding, shielding] = [jet.crowding(), jet.shielding(0.5 * jet.width)].map(|of| of / jet.grains as f64);
+        let limit = |level: f64| {
+            let percent = 100.0 * level;
+            crossing(&errors(series, 1, CARRIED), level).map_or_else(
+                || format!("{percent:.0} % nowhere"),
+                |grains| format!("{percent:.0} % from {} ({:.2}) on", grains * crowding, grains.value * shielding),
             )
-        });
+        };
         report.measured(
             format!(
-                "A jet {} m wide and {} m long: a first-order run misses the energy carried by",
+                "A jet {} m wide and {} m long: a first-order run misses the energy carried, by crowding pi d^2 N / A (in brackets the \
+                 shielding exponent over half the width), by",
                 jet.width, jet.length
             ),
-            measured.join(", "),
+            LEVELS.map(limit).join(", "),
         );
     }
 }
@@ -268,12 +264,12 @@ fn tell_energy_left(contacts: &[Series], report: &mut Report) {
         let Some(point) = series.last() else { continue };
         let jet = &point[0].jet;
         let alpha = point[0].mean(LEFT.1) + -jet.restitution.powi(2);
+        let withheld = point[0].mean(|energies| energies.withheld).value;
+        let kept =
+            if withheld > 0.0 { format!(", {withheld:.0e} of it kept by the end of collapses") } else { String::new() };
         report.measured(
             format!("{}: alpha_interf of eq. (47), {} grains", contact_of(series), jet.grains),
-            format!(
-                "{alpha}; {:.0e} of E0 is withheld where grains collapse",
-                point[0].mean(|energies| energies.withheld).value
-            ),
+            format!("{alpha}{kept}"),
         );
     }
 }
