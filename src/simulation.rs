@@ -10,7 +10,7 @@ use crate::grains::{NewGrain, Snapshot};
 use crate::law::{ContactLaw, Friction};
 use crate::law::{NearField, Term};
 use crate::near_field::{Bound, CutOff, ForceSum, Method};
-use crate::scene::{self, Boundary, Interference, Invalid, Scene, Substep, Summation};
+use crate::scene::{Boundary, Interference, Invalid, Scene, Substep, Summation};
 use crate::scheme::stepped::{Comparator, Crowd, Stepped, Steps};
 use crate::scheme::{Broken, EventDriven, Forces, Laws, Length, Moments, Observer, Progress, SubSteps, Substepped};
 use crate::source::{self, Displacement, Nozzle, Placed};

@@ -10,8 +10,7 @@ use impinge::study::compare::{Failed, Options, Plan, scheme_names};
 use miette::miette;
 
 use super::progress::ProgressLine;
-use super::run::{catch_interrupt, report};
-use super::{Ending, Failure, SceneArgs, print};
+use super::{Ending, Failure, SceneArgs, catch_interrupt, print, report};
 
 #[derive(clap::Args)]
 pub(super) struct Args {

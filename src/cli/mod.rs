@@ -8,16 +8,20 @@ mod compare;
 mod estimate;
 mod forces;
 mod progress;
+mod reproduce;
 mod run;
 mod schema;
 
 use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{Parser, Subcommand};
+use impinge::output;
 use impinge::scene::{Overrides, SceneError, SceneFile};
-use miette::{MietteHandlerOpts, Report};
+use miette::{MietteHandlerOpts, Report, miette};
 
 /// Event-driven hard-sphere simulator for erosive jets.
 #[derive(Parser)]
@@ -35,6 +39,8 @@ enum Command {
     Compare(compare::Args),
     /// Validate a scene and print what it would do.
     Check(check::Args),
+    /// Put what papers state to the test: numbers, pictures and a verdict.
+    Reproduce(reproduce::Args),
     /// Print the JSON schema of scene files.
     Schema,
 }
@@ -95,6 +101,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Run(args) => run::run(args),
         Command::Compare(args) => compare::compare(args),
         Command::Check(args) => check::check(args),
+        Command::Reproduce(args) => reproduce::reproduce(args),
         Command::Schema => schema::schema(),
     };
     let (report, code) = match result {
@@ -118,6 +125,25 @@ fn show_errors_plainly() {
         })
     }));
     set.expect("the hook is set once, before any error");
+}
+
+/// An output error with its remedy.
+fn report(error: &output::Error) -> Report {
+    miette!(help = error.remedy(), "{error}")
+}
+
+/// A flag that Ctrl-C raises, or the polite request of a batch system to end; what runs stops at its next look. A second one does
+/// not wait for that.
+fn catch_interrupt() -> Result<Arc<AtomicBool>, Failure> {
+    let flag = Arc::new(AtomicBool::new(false));
+    let raised = Arc::clone(&flag);
+    ctrlc::set_handler(move || {
+        if raised.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    })
+    .map_err(|error| Failure::Run(miette!("cannot listen for Ctrl-C: {error}")))?;
+    Ok(flag)
 }
 
 /// Writes results to standard output. A reader that stops reading, as `head` does, is no failure.

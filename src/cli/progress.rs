@@ -54,6 +54,30 @@ impl ProgressLine {
     }
 }
 
+/// How many runs of a study are done, on standard error; nothing when that is no terminal.
+pub(super) struct StudyLine(ProgressBar);
+
+impl StudyLine {
+    pub(super) fn new(study: &'static str) -> Self {
+        let style =
+            ProgressStyle::with_template("{percent:>3} % [{bar:30}] {msg}, {elapsed}").expect("the template is right");
+        let bar = ProgressBar::with_draw_target(Some(STEPS as u64), ProgressDrawTarget::stderr());
+        Self(bar.with_style(style.progress_chars("=> ")).with_message(study))
+    }
+
+    /// Shows the part that is done, 0 to 1; the bar itself sees to it that it does not change too often.
+    pub(super) fn show(&self, done: f64) {
+        if !self.0.is_hidden() {
+            self.0.set_position((done * STEPS) as u64);
+        }
+    }
+
+    /// Takes the line away.
+    pub(super) fn clear(&self) {
+        self.0.finish_and_clear();
+    }
+}
+
 /// `done` is the simulated part of the run, 0 to 1; `elapsed` the time on the clock, s.
 fn describe(progress: &Progress, done: f64, elapsed: f64) -> String {
     let speed = progress.collisions as f64 / elapsed.max(f64::MIN_POSITIVE);

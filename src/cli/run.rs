@@ -2,8 +2,7 @@
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
@@ -12,10 +11,10 @@ use impinge::scene::Scheme;
 use impinge::scheme::{Broken, LARGEST_OVERLAP_WITH_FORCES};
 use impinge::simulation::Simulation;
 use impinge::source::Nozzle;
-use miette::{Report, miette};
+use miette::miette;
 
 use super::progress::ProgressLine;
-use super::{Ending, Failure, SceneArgs, print};
+use super::{Ending, Failure, SceneArgs, catch_interrupt, print, report};
 
 #[derive(clap::Args)]
 pub(super) struct Args {
@@ -91,23 +90,4 @@ pub(super) fn run(args: &Args) -> Result<Ending, Failure> {
     let (summary, written) = recorder.finish(&outcome).map_err(|error| Failure::Run(report(&error)))?;
     print(&format!("{summary}\nwritten to {}\n", written.display()))?;
     Ok(if outcome.interrupted { Ending::Interrupted } else { Ending::Done })
-}
-
-/// An output error with its remedy.
-pub(super) fn report(error: &output::Error) -> Report {
-    miette!(help = error.remedy(), "{error}")
-}
-
-/// A flag that Ctrl-C raises, or the polite request of a batch system to end; the run stops at its next look. A second one does
-/// not wait for that.
-pub(super) fn catch_interrupt() -> Result<Arc<AtomicBool>, Failure> {
-    let flag = Arc::new(AtomicBool::new(false));
-    let raised = Arc::clone(&flag);
-    ctrlc::set_handler(move || {
-        if raised.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    })
-    .map_err(|error| Failure::Run(miette!("cannot listen for Ctrl-C: {error}")))?;
-    Ok(flag)
 }

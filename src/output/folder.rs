@@ -11,8 +11,8 @@ use tempfile::TempDir;
 
 use super::Error;
 
-/// Every name that a run may write; a folder with anything else in it is never replaced.
-const NAMES: [&str; 15] = [
+/// Every name that a run or a study may write; a folder with anything else in it is never replaced.
+const NAMES: [&str; 18] = [
     "summary.json",
     "grains.csv",
     "events.csv",
@@ -28,6 +28,9 @@ const NAMES: [&str; 15] = [
     "compare.csv",
     "ensemble.csv",
     "speed_against_error.svg",
+    "verdict.md",
+    "tables",
+    "pictures",
 ];
 
 /// A folder of results in the making.

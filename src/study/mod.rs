@@ -1,3 +1,4 @@
-//! Studies: many runs, and what they say together.
+//! Studies: many runs, what they say together, and how sure that is.
 
 pub mod compare;
+pub mod reproduce;

@@ -2,6 +2,7 @@
 //!
 //! Each function gives the text of a picture, or none where there is nothing to show.
 
+mod chart;
 mod history;
 mod hit_order;
 mod impacts;
@@ -15,6 +16,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
+pub use chart::drawn;
 pub use history::energy_history;
 pub use hit_order::energy_by_hit_order;
 pub use impacts::impacts;

@@ -1,0 +1,85 @@
+//! `impinge reproduce`
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+
+use impinge::output::{Folder, Reproduction};
+use impinge::study::reproduce::{Error, STUDIES, Settings, Study};
+use miette::miette;
+
+use super::progress::StudyLine;
+use super::{Ending, Failure, catch_interrupt, print, report};
+
+/// The name that stands for all studies.
+const ALL: &str = "all";
+
+#[derive(clap::Args)]
+pub(super) struct Args {
+    /// Name of a study, or `all`.
+    #[arg(required_unless_present = "list")]
+    name: Option<String>,
+    /// List the studies.
+    #[arg(long, conflicts_with = "name")]
+    list: bool,
+    /// Folder for the results; with `all` a folder of their folders [default: the name, in the current folder].
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Fewer and smaller runs: seconds instead of minutes, with larger uncertainties.
+    #[arg(long)]
+    quick: bool,
+    /// Replace the results of an earlier study in that folder.
+    #[arg(long)]
+    force: bool,
+    /// Seed of the first run; the others count on from it.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(..=u64::from(u32::MAX)))]
+    seed: u64,
+}
+
+/// Lists the studies, or computes them one after another; each has its results written before the next begins.
+pub(super) fn reproduce(args: &Args) -> Result<Ending, Failure> {
+    let Some(name) = &args.name else { return list() };
+    let target = args.output.clone().unwrap_or_else(|| PathBuf::from(name));
+    let studies: Vec<(&Study, PathBuf)> = match Study::named(name) {
+        Some(study) => vec![(study, target)],
+        None if name == ALL => STUDIES.into_iter().map(|study| (study, target.join(study.name))).collect(),
+        None => {
+            let help = format!("did you mean `{}`? `impinge reproduce --list` lists all", Study::nearest(name).name);
+            return Err(Failure::Input(miette!(help = help, "there is no study `{name}`")));
+        }
+    };
+    // Whatever must not be replaced is found before the first study has taken its minutes.
+    let begin = |(study, target): (&'static Study, PathBuf)| Ok((study, begin(&target, args.force)?));
+    let begun = studies.into_iter().map(begin).collect::<Result<Vec<_>, Failure>>()?;
+    let interrupted = catch_interrupt()?;
+    for (study, folder) in begun {
+        let line = StudyLine::new(study.name);
+        let watch = |done| {
+            line.show(done);
+            if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        let found = (study.compute)(&Settings { quick: args.quick, seed: args.seed, watch: &watch });
+        line.clear();
+        let found = match found {
+            Ok(found) => found,
+            Err(Error::BrokenOff) => return Ok(Ending::Interrupted),
+            Err(error) => return Err(Failure::Run(miette!("{}: {error}", study.name))),
+        };
+        let verdict = Reproduction::new(study, args.quick, args.seed, &found);
+        let written = verdict.write(&found, folder).map_err(|error| Failure::Run(report(&error)))?;
+        print(&format!("{verdict}written to {}\n\n", written.display()))?;
+    }
+    Ok(Ending::Done)
+}
+
+fn begin(target: &Path, force: bool) -> Result<Folder, Failure> {
+    Folder::begin(target, force).map_err(|error| Failure::Input(report(&error)))
+}
+
+/// Prints the name of each study and what it is about.
+fn list() -> Result<Ending, Failure> {
+    let widest = STUDIES.iter().map(|study| study.name.len()).max().unwrap_or(0);
+    let lines = STUDIES.iter().map(|study| format!("{:widest$}  {}\n", study.name, study.title));
+    print(&lines.collect::<String>())?;
+    Ok(Ending::Done)
+}

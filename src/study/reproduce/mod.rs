@@ -1,0 +1,82 @@
+//! What papers state, put to the test: each study computes numbers, pictures and a verdict.
+//!
+//! A study is a file here and a line in [`STUDIES`]. It gets [`Settings`] and gives a [`Report`]; it reads no file and writes none.
+//! What studies share: [`run_all`] (many runs on all cores, in a fixed order), [`Estimate`] (a mean and how sure it is),
+//! [`Chart`] and [`Map`] (pictures as data), [`Jet`] (the reference jet) and [`Sequence`] (two grains and a wall, in closed form).
+
+mod ensemble;
+mod fig18;
+mod fig4;
+mod first_order_or_repeated;
+mod jet;
+mod report;
+mod sequence;
+mod statistics;
+mod two_grains;
+
+use std::ops::ControlFlow;
+
+pub use ensemble::{Error, run_all};
+pub use jet::{Energies, Jet};
+pub use report::{Axis, Chart, Finding, Line, Map, Mark, Picture, Report, Scale, Table, Verdict};
+pub use sequence::Sequence;
+pub use statistics::{Estimate, Slope, crossing};
+
+/// All studies, in the order in which they are listed.
+pub const STUDIES: [&Study; 4] = [&fig4::STUDY, &fig18::STUDY, &two_grains::STUDY, &first_order_or_repeated::STUDY];
+
+/// One statement and the computation that puts it to the test.
+#[derive(Debug)]
+pub struct Study {
+    /// What it is asked for by: the number of the paper and of its figure, or a few words.
+    pub name: &'static str,
+    /// What it is about, in a line.
+    pub title: &'static str,
+    /// Who states it, and where.
+    pub source: &'static str,
+    /// What is stated.
+    pub statement: &'static str,
+    /// Computes it.
+    pub compute: fn(&Settings<'_>) -> Result<Report, Error>,
+}
+
+impl Study {
+    /// The study of this name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<&'static Self> {
+        STUDIES.into_iter().find(|study| study.name == name)
+    }
+
+    /// The study whose name looks most like this one.
+    #[must_use]
+    pub fn nearest(name: &str) -> &'static Self {
+        let unlike = |study: &&&Self| strsim::damerau_levenshtein(study.name, name);
+        STUDIES.iter().min_by_key(unlike).unwrap_or(&STUDIES[0])
+    }
+}
+
+/// How a study is computed.
+pub struct Settings<'a> {
+    /// Fewer and smaller runs: seconds instead of minutes, with larger uncertainties.
+    pub quick: bool,
+    /// Seed of the first run; the others count on from it.
+    pub seed: u64,
+    /// Called now and then, from any thread, with the part of the runs that are done (0 to 1); breaks the study off.
+    pub watch: &'a (dyn Fn(f64) -> ControlFlow<()> + Sync),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_unique_and_one_that_is_mistyped_is_found() {
+        let mut names: Vec<_> = STUDIES.iter().map(|study| study.name).collect();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), STUDIES.len());
+        assert_eq!(Study::nearest("fig4").name, "002-fig4");
+        assert_eq!(Study::nearest("two-grain").name, "two-grains");
+        assert!(Study::named("two-grain").is_none());
+    }
+}
