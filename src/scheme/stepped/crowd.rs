@@ -7,7 +7,6 @@ use super::books::Books;
 use super::neighbours::Neighbours;
 use crate::grains::{Grain, NewGrain, Snapshot};
 use crate::law::Body;
-use crate::near_field::Singular;
 use crate::scene::Interference;
 use crate::scheme::event_driven::{carried, flight, side_by_side};
 use crate::scheme::{Broken, Forces, GrainCollision, Laws, Observer, Passage, SurfaceHit};
@@ -15,9 +14,6 @@ use crate::surface::{LARGEST_SLOPE, Surface};
 
 /// How far from the surface (in radii) a mesh is asked for its distance: farther, more of its index would be searched for nothing.
 const SIGHT: f64 = 10.0;
-
-/// The new slot of a grain that is gone.
-pub const GONE: u32 = u32::MAX;
 
 /// Two grains that are near each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,35 +35,35 @@ pub struct Crowd {
     pub flights: Vec<Flight>,
     /// What grains carry besides: masses, spins, hits.
     pub grains: Vec<Grain>,
-    laws: Laws,
-    domain: Domain,
-    surface: Surface,
-    forces: Forces,
-    strengths: bool,
-    neighbours: Neighbours,
+    pub(super) laws: Laws,
+    pub(super) domain: Domain,
+    pub(super) surface: Surface,
+    pub(super) forces: Forces,
+    pub(super) strengths: bool,
+    pub(super) neighbours: Neighbours,
     /// How far each grain is from the surface.
-    clear: Vec<Clear>,
+    pub(super) clear: Vec<Clear>,
     /// Slots of the grains that are nearer to the surface than was asked.
-    at_surface: Vec<u32>,
+    pub(super) at_surface: Vec<u32>,
     /// Largest speed of a part of the surface, m/s.
-    surface_speed: f64,
+    pub(super) surface_speed: f64,
     /// Whether grains that have hit the surface pass through it from then on.
-    once_only: bool,
-    leaving: Vec<(u32, Passage)>,
+    pub(super) once_only: bool,
+    pub(super) leaving: Vec<(u32, Passage)>,
     /// Mass of all grains, kg.
-    mass: f64,
-    start: f64,
+    pub(super) mass: f64,
+    pub(super) start: f64,
     /// Time since the start, s: it resolves a step where simulated time does not.
-    clock: f64,
-    entered: u64,
-    collisions: u64,
-    books: Books,
-    told: Books,
+    pub(super) clock: f64,
+    pub(super) entered: u64,
+    pub(super) collisions: u64,
+    pub(super) books: Books,
+    pub(super) told: Books,
 }
 
 /// A grain is clear of the surface until it has moved so far.
 #[derive(Clone, Copy, Debug)]
-struct Clear {
+pub(super) struct Clear {
     /// Where it was, m.
     from: Vector3<f64>,
     /// When, s.
@@ -78,7 +74,8 @@ struct Clear {
     passes: bool,
 }
 
-const UNKNOWN: Clear = Clear { from: Vector3::new(0.0, 0.0, 0.0), clock: 0.0, gap: f64::NEG_INFINITY, passes: false };
+pub(super) const UNKNOWN: Clear =
+    Clear { from: Vector3::new(0.0, 0.0, 0.0), clock: 0.0, gap: f64::NEG_INFINITY, passes: false };
 
 impl Crowd {
     /// `grains` at simulated time `start` (s).
@@ -152,12 +149,6 @@ impl Crowd {
         self.collisions
     }
 
-    /// Whether a near field acts, so that accelerations depend on positions.
-    #[must_use]
-    pub fn has_near_field(&self) -> bool {
-        self.forces.near_field.is_some()
-    }
-
     /// What a law needs to know of a grain as it is now.
     #[must_use]
     pub fn body(&self, slot: u32) -> Body {
@@ -169,24 +160,6 @@ impl Crowd {
     pub fn put(&mut self, slot: u32, body: &Body) {
         self.flights[slot as usize].velocity = body.velocity;
         self.grains[slot as usize].spin = body.spin;
-    }
-
-    /// A speed (m/s) at which grains may hit each other or the surface: that of the fastest grain now, and of the surface, and what a fall through the
-    /// whole domain adds to it, or two grains that the near field draws from far away to contact.
-    #[must_use]
-    pub fn fastest_impact(&self) -> f64 {
-        let fastest = self.flights.iter().map(|flight| flight.velocity.norm()).fold(0.0, f64::max) + self.surface_speed;
-        let gravity = self.forces.gravity;
-        let fall = if gravity == Vector3::zeros() { 0.0 } else { gravity.abs().dot(&self.domain.extent()) };
-        let drawn = self.forces.near_field.as_ref().map_or(0.0, |near_field| {
-            let depth = |(flight, grain): (&Flight, &Grain)| {
-                let potential = near_field.law().potential(2.0 * flight.radius) * grain.strength.powi(2);
-                potential.abs() / grain.mass
-            };
-            self.flights.iter().zip(&self.grains).map(depth).fold(0.0, f64::max)
-        });
-        // m/2 v²/2 = depth for two of equal mass.
-        (fastest * fastest + 2.0 * fall + 4.0 * drawn).sqrt()
     }
 
     /// Looks around from where [`flights`](Self::flights) are now, `after` seconds into the step: then [`pairs`](Self::pairs) and
@@ -322,153 +295,9 @@ impl Crowd {
         observer.surface_hit(hit);
     }
 
-    /// Writes the acceleration of each grain under gravity and near field, from where [`flights`](Self::flights) are now, to `pull` (m/s²).
-    ///
-    /// # Errors
-    /// Grains between which there is no finite force.
-    pub fn pull(&mut self, pull: &mut Vec<Vector3<f64>>) -> Result<(), Broken> {
-        let Self { forces, grains, flights, strengths, .. } = self;
-        forces.pull(grains, flights, *strengths, pull).map_err(|singular| self.singular(&singular))
-    }
-
-    /// Books that `pull` (m/s², from [`pull`](Self::pull), read only where a near field acts) has acted for `duration` (s) on grains that fly as they do now. A scheme does so for
-    /// all the momentum that forces give to its grains, or the ledger does not close.
-    pub fn book(&mut self, pull: &[Vector3<f64>], duration: f64) {
-        let gravity = self.forces.gravity;
-        if gravity != Vector3::zeros() {
-            self.books.impulse_gravity += gravity * (self.mass * duration);
-        }
-        if self.forces.near_field.is_some() {
-            for ((pull, grain), flight) in pull.iter().zip(&self.grains).zip(&self.flights) {
-                let impulse = (pull - gravity) * (grain.mass * duration);
-                self.books.impulse_near_field += impulse;
-                self.books.work_near_field += impulse.dot(&flight.velocity);
-            }
-        }
-    }
-
-    /// Whether forces act at all.
-    pub(super) fn has_forces(&self) -> bool {
-        self.forces.gravity != Vector3::zeros() || self.has_near_field()
-    }
-
-    /// Tells `observer` what forces did since it was last told.
-    pub(super) fn tell_forces(&mut self, observer: &mut impl Observer) -> Result<(), Broken> {
-        if !self.has_forces() {
-            return Ok(());
-        }
-        let Self { forces, flights, grains, .. } = self;
-        let potential = forces.near_field.as_mut().map(|near_field| {
-            let positions: Vec<_> = flights.iter().map(|flight| flight.position).collect();
-            let strengths: Vec<_> = grains.iter().map(|grain| grain.strength).collect();
-            near_field.potential_energy(&positions, Some(&strengths))
-        });
-        let potential = potential.transpose().map_err(|singular| self.singular(&singular))?;
-        let depths = self.flights.iter().zip(&self.grains).map(|(flight, grain)| self.depth(flight, grain));
-        self.books.depth = Some(depths.sum());
-        observer.kick(&self.books.since(&self.told, self.time(), potential));
-        self.told = self.books;
-        Ok(())
-    }
-
-    /// m g·x, J.
-    fn depth(&self, flight: &Flight, grain: &Grain) -> f64 {
-        grain.mass * flight.position.dot(&self.forces.gravity)
-    }
-
-    fn singular(&self, singular: &Singular) -> Broken {
-        let id = |slot: usize| self.grains[slot].id;
-        let grains = match *singular {
-            Singular::Coincident(a, b) => vec![id(a), id(b)],
-            Singular::NotFinite(grain) => vec![id(grain)],
-        };
-        Broken::Singular { time: self.time(), grains }
-    }
-
     /// Time (s) from the beginning of the step until simulated time `end` (s).
     pub(super) fn room(&self, end: f64) -> f64 {
-        end - self.start - self.clock
-    }
-
-    /// Goes on by a step of length `taken` (s), to the end of which the grains have been advanced. Where grains go, tells the new slots of all.
-    pub(super) fn end_step(&mut self, taken: f64) -> Result<Option<Vec<u32>>, Broken> {
-        impinge_events::Surface::start_epoch(&mut self.surface, taken);
-        self.clock += taken;
-        let Domain { min, max, .. } = self.domain;
-        for slot in 0..self.flights.len() {
-            let place = &self.flights[slot].position;
-            // Not `<` and `>`: what is no number is not inside.
-            let inside = |axis: usize| min[axis] <= place[axis] && place[axis] <= max[axis];
-            if !(inside(0) && inside(1) && inside(2)) {
-                self.outside(slot)?;
-            }
-        }
-        Ok((!self.leaving.is_empty()).then(|| self.new_slots()))
-    }
-
-    fn new_slots(&self) -> Vec<u32> {
-        let mut slots = vec![0; self.flights.len()];
-        self.leaving.iter().for_each(|&(slot, _)| slots[slot as usize] = GONE);
-        (0..).zip(slots.iter_mut().filter(|slot| **slot != GONE)).for_each(|(new, slot)| *slot = new);
-        slots
-    }
-
-    /// A grain is no longer inside the domain.
-    #[cold]
-    fn outside(&mut self, slot: usize) -> Result<(), Broken> {
-        let Flight { position, velocity, .. } = self.flights[slot];
-        if !position.iter().chain(&velocity).all(|x| x.is_finite()) {
-            return Err(Broken::NotANumber { time: self.time(), grains: vec![self.grains[slot].id] });
-        }
-        if !self.domain.periodic {
-            self.leaving.push((slot as u32, Passage::Left));
-            return Ok(());
-        }
-        let before = self.depth(&self.flights[slot], &self.grains[slot]);
-        self.domain.wrap(&mut self.flights[slot].position);
-        self.books.carried_away += before - self.depth(&self.flights[slot], &self.grains[slot]);
-        Ok(())
-    }
-
-    /// Takes out the grains that go.
-    pub(super) fn take_out(&mut self, slots: &[u32], observer: &mut impl Observer) {
-        let mut leaving = std::mem::take(&mut self.leaving);
-        leaving.sort_by_key(|&(slot, _)| slot);
-        // One that was removed and left in the same step goes once.
-        leaving.dedup_by_key(|&mut (slot, _)| slot);
-        for (slot, passage) in leaving {
-            let (flight, grain) = (self.flights[slot as usize], self.grains[slot as usize]);
-            self.books.carried_away += self.depth(&flight, &grain);
-            observer.passage(passage, self.time(), &flight, &grain);
-        }
-        retain(&mut self.flights, slots);
-        retain(&mut self.grains, slots);
-        retain(&mut self.clear, slots);
-        self.mass = self.grains.iter().map(|grain| grain.mass).sum();
-        self.neighbours.clear();
-    }
-
-    /// Takes a grain in now, in the last slot.
-    pub(super) fn enter(&mut self, new: &NewGrain, observer: &mut impl Observer) {
-        let (flight, grain) = (flight(new), carried(new, self.entered));
-        self.entered += 1;
-        self.strengths |= grain.strength != 1.0;
-        self.mass += grain.mass;
-        self.books.carried_away += -self.depth(&flight, &grain);
-        self.flights.push(flight);
-        self.grains.push(grain);
-        self.clear.push(UNKNOWN);
-        observer.passage(Passage::Entered, self.time(), &flight, &grain);
-    }
-
-    /// Whether a grain of this radius (m) at `position` (m) overlaps no other. The surface is not asked.
-    #[must_use]
-    pub fn is_free(&self, position: Vector3<f64>, radius: f64) -> bool {
-        self.laws.interference == Interference::None
-            || self
-                .flights
-                .iter()
-                .all(|flight| self.domain.nearest(flight.position - position).norm() >= flight.radius + radius)
+        (end - self.start) - self.clock
     }
 
     /// Shows all grains as they are now.
@@ -479,10 +308,4 @@ impl Crowd {
         let grains: Vec<Grain> = slots.iter().map(|&slot| self.grains[slot]).collect();
         look(&Snapshot { time, flights: &flights, grains: &grains })
     }
-}
-
-/// Keeps what has a slot.
-pub fn retain<T>(of: &mut Vec<T>, slots: &[u32]) {
-    let mut slots = slots.iter();
-    of.retain(|_| slots.next().is_some_and(|&slot| slot != GONE));
 }

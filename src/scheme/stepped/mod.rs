@@ -56,12 +56,14 @@ mod books;
 mod comparator;
 mod crowd;
 mod neighbours;
+mod passages;
 mod record;
 
 use std::ops::ControlFlow;
 
 pub use self::comparator::Comparator;
-pub use self::crowd::{Crowd, GONE, Near, retain};
+pub use self::crowd::{Crowd, Near};
+pub use self::passages::{GONE, retain};
 pub use self::record::energies;
 use super::{Broken, Observer, Progress};
 use crate::grains::NewGrain;
@@ -131,7 +133,7 @@ impl<M: Method> Stepped<M> {
             }
             let taken = method.step(crowd, room, observer)?;
             steps.note(taken);
-            if let Some(slots) = crowd.end_step(taken)? {
+            if let Some(slots) = crowd.end_step(taken, end)? {
                 method.renumber(crowd, &slots, observer);
                 crowd.take_out(&slots, observer);
             }
