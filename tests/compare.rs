@@ -122,13 +122,13 @@ fn sub_steps_are_compared_with_finer_ones_and_show_their_order() {
         grain = { radius = 0.05, density = 1000.0 }
         contact.grain.restitution = 0.9
         contact.surface.restitution = 0.9
-        near_field = { alpha1 = 0.05, beta1 = 2.0, alpha2 = 0.0, beta2 = 3.0, substep = 0.004 }
+        near_field = { alpha1 = 0.05, beta1 = 2.0, alpha2 = 0.0, beta2 = 3.0, substep = 0.002 }
         source = [{ kind = "lattice", min = [0, 0, 0.1], max = [0.3, 0.01, 1.1], cells = [2, 1, 2], velocity = [0.3, 0, -1] }]
         surface = [{ kind = "plane", point = [0, 0, 0], normal = [0.1, 0, 1] }]
     "#;
     let comparison = compare(falling, Options { quick: false, ..event_driven() });
     let reference = &comparison.reference;
-    assert_eq!((reference.regime, reference.sub_step), (Regime::Pointwise, Some(0.004 * 0.5 / 8.0)));
+    assert_eq!((reference.regime, reference.sub_step), (Regime::Pointwise, Some(0.001 / 8.0)));
     let [curve] = comparison.curves.as_slice() else { panic!("one curve") };
     let errors: Vec<_> = curve.done().map(|(_, scores)| scores.error).collect();
     assert!(errors.len() == 4 && errors.is_sorted_by(|coarse, fine| coarse > fine), "{errors:?}");
@@ -172,7 +172,7 @@ fn a_source_that_keeps_sending_is_displaced_too() {
         flow = { volume_fraction = 0.1 }
     "#;
     let jet = compare(nozzle, event_driven());
-    assert!(jet.reference.spread.position > 1.0, "starts are the same: {}", jet.reference.spread.position);
+    assert_eq!(jet.reference.regime, Regime::Statistical, "starts are the same: {:?}", jet.reference.spread);
     assert!(jet.reference.members.windows(2).any(|pair| pair[0] != pair[1]));
 }
 

@@ -160,7 +160,7 @@ fn verdict(comparison: &Comparison) -> Vec<String> {
     });
     let orders: Vec<_> = orders.collect();
     if !orders.is_empty() {
-        sentences.push(format!("Between the two finest settings above the floor errors go {}.", orders.join(", ")));
+        sentences.push(format!("Above the floor errors go {}.", orders.join(", ")));
     }
     // What is exact shows the noise itself.
     let noise = comparison.curves.iter().filter(|curve| !curve.setting.is_empty());

@@ -45,13 +45,8 @@ pub fn speed_against_error(comparison: &Comparison) -> io::Result<Option<String>
     if points().next().is_none() {
         return Ok(None);
     }
-    let range = |of: fn((f64, f64)) -> f64| {
-        let (least, most) = points().map(of).fold((f64::MAX, 0.0), |(a, b), value| (a.min(value), f64::max(b, value)));
-        // At least a decade, so that there is a tick.
-        let (least, most) = (least / MARGIN, most * MARGIN);
-        if most < 10.0 * least { (0.5 * least, 5.0 * least) } else { (least, most) }
-    };
-    let (times, errors) = (range(|point| point.0), range(|point| point.1));
+    let times = range(points().map(|point| point.0));
+    let errors = range(points().map(|point| point.1).chain((floor > 0.0).then_some(floor)));
     let what = match comparison.reference.regime {
         Regime::Pointwise => "Largest error in the position of a grain at the end",
         Regime::Statistical => "Error of energies, impulse and counts (root mean square)",
@@ -66,6 +61,13 @@ pub fn speed_against_error(comparison: &Comparison) -> io::Result<Option<String>
         draw_key(area, &drawings)
     })
     .map(Some)
+}
+
+/// From the least to the most of positive values, with room on both sides; at least a decade, so that there is a tick.
+fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (least, most) = values.fold((f64::MAX, 0.0), |(a, b), value| (value.min(a), value.max(b)));
+    let (least, most) = (least / MARGIN, most * MARGIN);
+    if most < 10.0 * least { (0.5 * least, 5.0 * least) } else { (least, most) }
 }
 
 fn draw_curves(
@@ -177,6 +179,13 @@ mod tests {
             }
             assert!(!svg.contains("NaN") && !svg.contains("inf"));
         }
+    }
+
+    #[test]
+    fn ranges_hold_all_values_and_a_tick() {
+        assert_eq!(range([1.0, 100.0].into_iter()), (0.5, 200.0));
+        let (least, most) = range([3.0].into_iter());
+        assert!(least < 3.0 && 3.0 < most && most / least >= 10.0, "{least} to {most}");
     }
 
     #[test]

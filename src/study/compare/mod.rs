@@ -40,7 +40,7 @@ pub use measure::{QUANTITIES, Quantities};
 pub use reference::{DEVIATIONS, ENSEMBLE, PROBE, Reference, Regime, SPREAD};
 pub use runner::{Failed, Watch};
 pub use statistics::Statistics;
-pub use verdict::{Level, order};
+pub use verdict::Level;
 
 use crate::scene::{Invalid, Output, Run, Scene};
 use crate::simulation::{self, Simulation};

@@ -70,23 +70,24 @@ impl Curve {
         }
     }
 
-    /// Observed order: how the error falls with the setting, from the two finest runs whose errors are above the floor.
+    /// Observed order: the power p in error ~ setting^p that fits the runs best whose errors are above the floor and below 1, beyond which
+    /// errors no longer grow. None where fewer than two are left.
     #[must_use]
     pub fn order(&self) -> Option<f64> {
-        let above: Vec<_> = self
-            .done()
-            .filter(|(_, scores)| !scores.is_noise())
-            .filter_map(|(entry, scores)| Some((entry.value?, scores.error)))
-            .collect();
-        let [.., coarse, fine] = above.as_slice() else { return None };
-        Some(order(*coarse, *fine))
+        let telling = self.done().filter(|(_, scores)| !scores.is_noise() && scores.error < 1.0);
+        let points: Vec<_> =
+            telling.filter_map(|(entry, scores)| Some((entry.value?.ln(), scores.error.ln()))).collect();
+        slope(&points)
     }
 }
 
-/// The power p in error ~ setting^p, from two pairs of setting and error.
-#[must_use]
-pub fn order(coarse: (f64, f64), fine: (f64, f64)) -> f64 {
-    (coarse.1 / fine.1).ln() / (coarse.0 / fine.0).ln()
+/// Slope of the straight line through some points, by least squares; none through fewer than two.
+fn slope(points: &[(f64, f64)]) -> Option<f64> {
+    let n = points.len() as f64;
+    let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / n;
+    let (x, y) = (mean(|point| point.0), mean(|point| point.1));
+    let spread = points.iter().map(|point| (point.0 - x).powi(2)).sum::<f64>();
+    (points.len() > 1).then(|| points.iter().map(|point| (point.0 - x) * (point.1 - y)).sum::<f64>() / spread)
 }
 
 #[cfg(test)]
@@ -128,6 +129,7 @@ mod tests {
         let Ok(scores) = &mut comparison.curves[1].entries[3].result else { panic!("it has a result") };
         scores.error = 0.5 * FLOOR;
         approx::assert_relative_eq!(comparison.curves[1].order().expect("a power law"), 1.0, max_relative = 1e-12);
-        assert_eq!(order((0.4, 0.16), (0.2, 0.04)).round(), 2.0);
+        assert_eq!(slope(&[(0.0, 1.0), (1.0, 2.5), (2.0, 5.0)]), Some(2.0));
+        assert_eq!(slope(&[(0.0, 1.0)]), None);
     }
 }
