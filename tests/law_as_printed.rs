@@ -71,7 +71,7 @@ fn friction_of_the_wall_takes_energy() {
     let (mut printed_gains, mut gains) = (0, 0);
     for _ in 0..2000 {
         let mut vector = || Vector3::from_fn(|_, _| random.random_range(-1.0..1.0));
-        let (mut v, w) = (vector(), vector());
+        let (mut v, w): (Vector3<f64>, Vector3<f64>) = (vector(), vector());
         v.z = -v.z.abs();
         let hit = resolve_surface(&law, &Body { mass, radius, velocity: v, spin: w }, normal, Vector3::zeros());
         // What the normal impulse leaves, so that only friction is compared.

@@ -98,9 +98,9 @@ fn free_flight_is_exact_where_the_printed_equations_halve_it() {
 /// PHYSICS 2.21: with the impulse of Algorithm 1 taken from the current iterate a grain hardly rebounds, and it takes more than a hundred sweeps to say so.
 #[test]
 fn restitution_is_exact_where_algorithm_1_has_none() {
-    for e in [0.0, 0.5, 0.8, 1.0] {
-        let before = -1.0;
-        let (mut v, mut sweeps) = (before, 0);
+    for e in [0.0f64, 0.5, 0.8, 1.0] {
+        let before: f64 = -1.0;
+        let (mut v, mut sweeps): (f64, u32) = (before, 0);
         loop {
             let next = before + 0.5 * (-(1.0 + e) * v - (1.0 + e) * before);
             sweeps += 1;
@@ -250,7 +250,7 @@ fn a_shower_converges_to_the_event_driven_answer() {
         let outcome = run(&shower(), 0.5, until / f64::from(steps), until);
         errors.push(apart(&outcome.states, &exact.states));
         eprintln!(
-            "{steps} steps: {:?} of {:?} hits, errors {:e?}",
+            "{steps} steps: {:?} of {:?} hits, errors {:?}",
             hits(&outcome.log),
             hits(&exact.log),
             errors.last()
@@ -262,9 +262,9 @@ fn a_shower_converges_to_the_event_driven_answer() {
     assert!(hits(&exact.log)[0] > 3 && hits(&exact.log)[1] > 20);
     for pair in errors.windows(2) {
         let [coarse, fine] = [pair[0], pair[1]];
-        assert!((0..2).all(|of| fine[of] < 0.3 * coarse[of]), "an eighth of the step: {errors:e?}");
+        assert!((0..2).all(|of| fine[of] < 0.3 * coarse[of]), "an eighth of the step: {errors:?}");
     }
-    assert!(errors[2].iter().all(|&error| error < 1e-4), "{errors:e?}");
+    assert!(errors[2].iter().all(|&error| error < 1e-4), "{errors:?}");
 }
 
 /// A grain over an inner edge of a mesh gets one impulse, not one from each triangle that iterates see it on.
@@ -302,8 +302,8 @@ fn books_under_forces_close() {
         );
         outcome.ledger.relative_energy_residual().abs()
     });
-    eprintln!("{residuals:e?}");
-    assert!(residuals[1] < 1e-4 && residuals[1] < 0.5 * residuals[0], "{residuals:e?}");
+    eprintln!("{residuals:?}");
+    assert!(residuals[1] < 1e-4 && residuals[1] < 0.5 * residuals[0], "{residuals:?}");
 
     // Without a contact, the trapezoidal rule does the work of gravity exactly.
     let free = Scene { grains: shower().grains, gravity, ..Scene::of(Vec::new()) };
