@@ -249,12 +249,7 @@ fn a_shower_converges_to_the_event_driven_answer() {
     for steps in [4_001, 32_003, 256_019] {
         let outcome = run(&shower(), 0.5, until / f64::from(steps), until);
         errors.push(apart(&outcome.states, &exact.states));
-        eprintln!(
-            "{steps} steps: {:?} of {:?} hits, errors {:?}",
-            hits(&outcome.log),
-            hits(&exact.log),
-            errors.last()
-        );
+        eprintln!("{steps} steps: {:?} of {:?} hits, errors {:?}", hits(&outcome.log), hits(&exact.log), errors.last());
         assert_eq!(hits(&outcome.log), hits(&exact.log));
         assert!(outcome.ledger.relative_energy_residual().abs() < 1e-14, "no grain has two contacts in a step");
         assert!(outcome.ledger.relative_momentum_residual() < 1e-14);
