@@ -32,8 +32,9 @@ pub(super) struct Ladder {
     set: fn(&mut Scene, f64),
 }
 
-/// All of them. A scheme with two settings stands here twice; the other setting is then that of the scene, or its default.
-static LADDERS: [Ladder; 7] = [
+/// All of them. A scheme with several settings stands here several times; the others are then those of the scene, or their defaults. Where no force
+/// acts, the fixed-point scheme iterates nothing, and predicted collisions choose its steps: only the overlap that it leaves counts.
+static LADDERS: [Ladder; 8] = [
     Ladder {
         scheme: Scheme::EventDriven,
         setting: "",
@@ -54,14 +55,21 @@ static LADDERS: [Ladder; 7] = [
         scheme: Scheme::FixedPoint,
         setting: "tolerance",
         unit: "",
-        values: |_| vec![1e-3, 1e-4, 1e-5, 1e-6, 1e-7],
+        values: |scales| if scales.sub_step.is_some() { vec![1e-3, 1e-4, 1e-5, 1e-6, 1e-7] } else { Vec::new() },
         set: |scene, value| scene.fixed_point.get_or_insert_default().tolerance = value,
+    },
+    Ladder {
+        scheme: Scheme::FixedPoint,
+        setting: "overlap",
+        unit: "",
+        values: |_| vec![1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6],
+        set: |scene, value| scene.fixed_point.get_or_insert_default().overlap = value,
     },
     Ladder {
         scheme: Scheme::FixedPoint,
         setting: "largest_step",
         unit: "s",
-        values: steps,
+        values: |scales| if scales.sub_step.is_some() { steps(scales) } else { Vec::new() },
         set: |scene, value| scene.fixed_point.get_or_insert_default().largest_step = Some(value),
     },
     Ladder {
