@@ -222,11 +222,12 @@ fn soft_spheres_converge_to_the_event_driven_answer_as_they_stiffen() {
     assert!(errors[3] < 0.06, "{errors:?}");
 }
 
+/// Up to the rounding of some twenty thousand additions.
 #[test]
 fn free_flight_is_exact() {
     let told = run(&with(&[one([1.0, 2.0, 3.0], [3.0, -2.0, 1.0], [1.0, 2.0, 3.0])], &["output.samples=7"]));
     let flight = told.flights[0];
-    assert!((flight.position - Vector3::new(1.3, 1.8, 3.1)).amax() < 1e-12, "{flight:?}");
+    assert!((flight.position - Vector3::new(1.3, 1.8, 3.1)).amax() < 1e-11, "{flight:?}");
     assert_eq!((flight.velocity, told.grains[0].spin), (Vector3::new(3.0, -2.0, 1.0), Vector3::new(1.0, 2.0, 3.0)));
 }
 

@@ -244,7 +244,8 @@ impl Method for SoftSphere {
         }
         crowd.look(step, 0.0);
         crowd.pull(&mut self.next)?;
-        if crowd.has_near_field() {
+        let far = crowd.has_near_field();
+        if far {
             // What contacts add is told by them, and booking needs the rest alone.
             self.next_pull.clone_from(&self.next);
         }
@@ -254,7 +255,9 @@ impl Method for SoftSphere {
             flight.velocity += (next - acceleration) * (0.5 * step);
         }
         std::mem::swap(&mut self.acceleration, &mut self.next);
-        std::mem::swap(&mut self.pull, &mut self.next_pull);
+        if far {
+            std::mem::swap(&mut self.pull, &mut self.next_pull);
+        }
         self.tell_ended(crowd, crowd.time() + step, observer);
         self.book(crowd, 0.5 * step);
         self.rub(crowd, step);
