@@ -235,8 +235,11 @@ fn deviation(scores: &Scores, quantity: usize) -> String {
     marked(value.abs() <= scores.floors[quantity], &format!("{sign}{}", percent(value)))
 }
 
+/// What needs no mark.
+const EXACT: [&str; 2] = ["0", "0 %"];
+
 fn marked(noise: bool, text: &str) -> String {
-    if noise && !text.starts_with('0') { format!("~{text}") } else { text.to_owned() }
+    if noise && !EXACT.contains(&text) { format!("~{text}") } else { text.to_owned() }
 }
 
 #[cfg(test)]
@@ -264,6 +267,7 @@ mod tests {
 
     #[test]
     fn what_is_below_the_floor_is_marked() {
+        assert_eq!([marked(true, "0.80 %"), marked(false, "3 %"), marked(true, "0 %")], ["~0.80 %", "3 %", "0 %"]);
         let scores = |error: f64| Scores {
             error,
             floor: FLOOR,
