@@ -246,7 +246,7 @@ fn a_shower_converges_to_the_event_driven_answer() {
     let exact = shower().run(0.1, until);
     let hits = |log: &Log| [log.grain_hits(), log.surface_hits()];
     let mut errors = Vec::new();
-    for steps in [4_001, 32_003, 256_019] {
+    for steps in [8_009, 64_007, 512_009] {
         let outcome = run(&shower(), 0.5, until / f64::from(steps), until);
         errors.push(apart(&outcome.states, &exact.states));
         eprintln!("{steps} steps: {:?} of {:?} hits, errors {:?}", hits(&outcome.log), hits(&exact.log), errors.last());
@@ -282,7 +282,7 @@ fn contacts_at_once_are_added_up_and_their_error_is_in_the_ledger() {
     assert_eq!(outcome.ledger.relative_energy_residual(), 1.0);
 }
 
-/// Impulses of forces are those that were given; the energy that a step gains or loses is of the order of the scheme.
+/// Impulses of forces are those that were given; the energy that steps with contacts gain or lose is of the first order.
 #[test]
 fn books_under_forces_close() {
     let gravity = Vector3::new(0.1, 0.0, -1.0);
@@ -298,7 +298,7 @@ fn books_under_forces_close() {
         outcome.ledger.relative_energy_residual().abs()
     });
     eprintln!("{residuals:?}");
-    assert!(residuals[1] < 1e-4 && residuals[1] < 0.5 * residuals[0], "{residuals:?}");
+    assert!(residuals[1] < 1e-3 && residuals[1] < 0.2 * residuals[0], "{residuals:?}");
 
     // Without a contact, the trapezoidal rule does the work of gravity exactly.
     let free = Scene { grains: shower().grains, gravity, ..Scene::of(Vec::new()) };
@@ -345,7 +345,7 @@ fn jet(set: &[&str]) -> (Ledger, SurfaceEnergy, Steps) {
 fn interference_is_that_of_the_event_driven_scheme() {
     let (ledger, surface, steps) = jet(&["run.interference=all"]);
     assert!(steps.longest <= 0.05 * 0.01 / 80.0 && steps.longest > 0.049 * 0.01 / 80.0, "{steps:?}");
-    assert!(steps.shortest > 0.9 * steps.longest, "samples do not cut steps short: {steps:?}");
+    assert!(steps.shortest > 0.5 * steps.longest, "samples and frames leave no splinters: {steps:?}");
     assert!(surface.by_order().len() > 2 && surface.repeated_hits() > 0.0);
     assert!(ledger.relative_energy_residual().abs() < 0.01, "{:e}", ledger.relative_energy_residual());
 
@@ -384,12 +384,15 @@ fn a_nozzle_feeds_the_scheme() {
     )
     .expect("a scene");
     let mut simulation = Simulation::new(&scene, ".".as_ref()).unwrap_or_else(|error| panic!("{error}"));
-    let mut ledger = Ledger::default();
-    simulation.run(&mut ledger, &mut |_| ControlFlow::Continue(())).unwrap_or_else(|error| panic!("{error}"));
+    let mut observed = (Log::default(), Ledger::default());
+    simulation.run(&mut observed, &mut |_| ControlFlow::Continue(())).unwrap_or_else(|error| panic!("{error}"));
+    let (log, ledger) = observed;
     assert!(ledger.counts().grain_surface > 50 && ledger.left().count() > 10 && ledger.inside().count() > 10);
     assert!(ledger.relative_momentum_residual() < 1e-13 && ledger.relative_energy_residual().abs() < 1e-2);
     let steps = simulation.steps().expect("steps");
-    assert!(steps.longest <= 0.05 * 0.05 / 10.0, "{steps:?}");
+    // Before the first grain comes a step may be as long as it likes.
+    assert!(steps.count > 1990 && steps.count < 2500, "{steps:?}");
+    assert!(log.largest_miss() < 0.1, "{}", log.largest_miss());
 }
 
 /// In a periodic domain momentum stays to rounding, and grains find each other across its sides.

@@ -172,7 +172,9 @@ impl Trapezoidal {
             }
         }
         crowd.book(pull, step);
-        pull.clone_from(end);
+        if crowd.has_near_field() {
+            pull.clone_from(end);
+        }
         for (flight, velocity) in crowd.flights.iter_mut().zip(&self.velocity) {
             flight.velocity = *velocity;
         }
