@@ -41,9 +41,9 @@ fn run_looking(scene: &Scene, settings: Settings, until: f64, looks: u32) -> Out
         run.tell(&mut observers).expect("finite forces");
         run.crowd().snapshot(time, |snapshot| observers.sample(snapshot));
     }
-    let states = run.crowd().snapshot(until, |snapshot| {
-        snapshot.flights.iter().copied().zip(snapshot.grains.iter().copied()).collect()
-    });
+    let states = run
+        .crowd()
+        .snapshot(until, |snapshot| snapshot.flights.iter().copied().zip(snapshot.grains.iter().copied()).collect());
     Outcome { states, log: observers.0, ledger: observers.1, steps: run.steps() }
 }
 

@@ -66,12 +66,7 @@ impl Iteration {
     }
 
     /// Iterates with this step (s): nothing where that converges, or else a shorter step to try.
-    pub(super) fn shorter_than(
-        &mut self,
-        crowd: &mut Crowd,
-        settings: &scene::FixedPoint,
-        step: f64,
-    ) -> Option<f64> {
+    pub(super) fn shorter_than(&mut self, crowd: &mut Crowd, settings: &scene::FixedPoint, step: f64) -> Option<f64> {
         self.pull.clone_from(&self.first_pull);
         if !crowd.has_near_field() {
             return None;
