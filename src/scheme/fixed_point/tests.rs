@@ -124,13 +124,13 @@ fn convergence_does_not_depend_on_the_distance_from_the_origin() {
         let mut crowd = orbit(1.0, from);
         let start = crowd.flights.clone();
         let mut places = [start[0].position; 3];
-        for k in 1..3 {
+        for place in &mut places[1..] {
             let mut pull = Vec::new();
             crowd.pull(&mut pull).expect("finite forces");
             for (flight, (start, pull)) in crowd.flights.iter_mut().zip(start.iter().zip(&pull)) {
                 flight.position = start.position + (start.velocity + pull * step) * step;
             }
-            places[k] = crowd.flights[0].position;
+            *place = crowd.flights[0].position;
         }
         (places[2] - places[1]).norm() / places[2].norm()
     };
@@ -147,10 +147,7 @@ fn contacts_that_are_found_anew_in_each_iterate_have_no_fixed_point() {
     let gap = 1e-6;
     for step in [1.001e-6, 2e-6, 1e-3, 1.0] {
         let iterate = |gap_k: f64| gap + step * if gap_k < 0.0 { after } else { before.velocity.z };
-        let mut gaps = [gap; 8];
-        for k in 1..8 {
-            gaps[k] = iterate(gaps[k - 1]);
-        }
+        let gaps: Vec<f64> = std::iter::successors(Some(gap), |&gap_k| Some(iterate(gap_k))).take(8).collect();
         assert!(gaps.iter().skip(1).step_by(2).all(|&gap| gap < 0.0));
         assert!(gaps.iter().skip(2).step_by(2).all(|&gap| gap > 0.0));
     }
