@@ -160,12 +160,13 @@ fn steps_are_of_first_order_in_a_smooth_near_field() {
 #[test]
 fn a_looser_tolerance_gives_a_larger_error() {
     let exact = cluster().run(2e-4, 0.8).states;
-    let errors = [1e-2, 1e-5, 1e-8].map(|tolerance| {
+    // The step is that of TOL^(1/(2 k_d)), so the error too.
+    let errors = [1e-4, 1e-8, 1e-12].map(|tolerance| {
         let outcome = run(&cluster(), Settings { tolerance, iterations: 2, ..Settings::default() }, 0.8);
         (apart(&outcome.states, &exact), outcome.steps.count)
     });
     eprintln!("{errors:?}");
-    assert!(errors.is_sorted_by(|one, next| one.0 > 2.0 * next.0 && one.1 < next.1), "{errors:?}");
+    assert!(errors.is_sorted_by(|one, next| one.0 > 4.0 * next.0 && one.1 < next.1), "{errors:?}");
 }
 
 /// A jet whose grains attract each other, collide and hit the floor.
@@ -258,11 +259,12 @@ fn one_thread_and_two_give_the_same_bits() {
         surface: vec![floor()],
         laws: rough(0.9, 0.3),
         near_field: Some(attraction(1e-3)),
+        gravity: Vector3::z() * -2.0,
         ..Scene::of(grains)
     };
     let [one, two] = [1, 2].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-        pool.install(|| run(&scene, Settings::default(), 0.3))
+        pool.install(|| run(&scene, Settings::default(), 0.5))
     });
     assert!(one.log.grain_hits() > 100 && one.log.surface_hits() > 10);
     assert_eq!(one.states, two.states);

@@ -10,6 +10,11 @@ use crate::scheme::stepped::Crowd;
 /// Least and greatest gap (in radii of the largest grain) up to which pairs are looked at. Nearer, a step that ends a contact would let grains escape
 /// the lists; farther, lists of a dense crowd hold more pairs than longer steps could pay for.
 const REACH: [f64; 2] = [0.25, 4.0];
+/// Least gap (in radii of the largest grain) up to which grains are looked at that come near the surface: a step must not be of no length where all
+/// grains rest. Each of them is compared with the surface in each step, which takes long where that is a mesh.
+const SURFACE_REACH: f64 = 0.02;
+/// How much farther is looked than grains fly in a step: as much faster may impulses and forces make them before the step is cut short.
+const MARGIN: f64 = 1.25;
 /// Lists are made for longer gaps than needed by this much, and are kept until they are longer than needed by its cube.
 const RESERVE: f64 = 2.0;
 
@@ -52,13 +57,13 @@ impl Lookout {
     /// Looks as far as collisions may come from within a step of length `offered` (s).
     pub(super) fn look(&mut self, crowd: &mut Crowd, settings: &scene::FixedPoint, speeds: &Speeds, offered: f64) {
         let [least, most] = REACH.map(|radii| radii * speeds.largest_radius);
-        let flown = offered / settings.safety;
+        let flown = MARGIN * offered / settings.safety;
         let needed = (speeds.apart * flown).clamp(least, most);
         if needed > self.reach || self.reach > RESERVE.powi(3) * needed {
             self.reach = (RESERVE * needed).min(most);
         }
         self.surface_speed = crowd.surface().speed() * 3f64.sqrt();
-        self.surface_reach = ((speeds.fastest + self.surface_speed) * flown).max(least);
+        self.surface_reach = ((speeds.fastest + self.surface_speed) * flown).max(SURFACE_REACH * speeds.largest_radius);
         crowd.look_ahead(offered, self.reach, self.surface_reach);
     }
 

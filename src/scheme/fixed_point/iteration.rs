@@ -74,24 +74,26 @@ impl Iteration {
         self.moves.clear();
         self.moves.resize(self.before.len(), Vector3::zeros());
         self.advance(crowd, step);
-        let (mut error, mut factor) = (1.0, 0.0);
+        let (mut error, mut factor) = (1.0, SHORTER[0]);
         for k in 1..=settings.iterations {
             self.count += 1;
-            let Ok(()) = crowd.pull(&mut self.pull) else { break };
+            let Ok(()) = crowd.pull(&mut self.pull) else { return Some(SHORTER[0] * step) };
             let last = std::mem::replace(&mut error, self.advance(crowd, step));
+            if error.is_nan() {
+                return Some(SHORTER[0] * step);
+            }
             factor = change_of_step(settings, error.max(ROUNDING), k);
             if error <= settings.tolerance {
                 let longer = settings.safety * factor * step;
                 self.expected = if error > ROUNDING { longer } else { longer.max(self.expected) };
                 return None;
             }
-            // What does not contract will not do so later. Neither will what is no number.
-            if !(error < last) {
+            // What does not contract will not do so later.
+            if error >= last {
                 break;
             }
         }
-        // Not `clamp`: a factor that is no number makes the step as short as may be.
-        Some(step * factor.max(SHORTER[0]).min(SHORTER[1]))
+        Some(step * factor.clamp(SHORTER[0], SHORTER[1]))
     }
 
     /// Equation (34): the next iterate. Gives how much it changed, over how far it is from r^L.

