@@ -42,7 +42,7 @@ pub(super) fn reproduce(args: &Args) -> Result<Ending, Failure> {
     let target = args.output.clone().unwrap_or_else(|| PathBuf::from(name));
     let studies: Vec<(&Study, PathBuf)> = match Study::named(name) {
         Some(study) => vec![(study, target)],
-        None if name == ALL => STUDIES.into_iter().map(|study| (study, target.join(study.name))).collect(),
+        None if name == ALL => STUDIES.iter().map(|&study| (study, target.join(study.name))).collect(),
         None => {
             let help = format!("did you mean `{}`? `impinge reproduce --list` lists all", Study::nearest(name).name);
             return Err(Failure::Input(miette!(help = help, "there is no study `{name}`")));

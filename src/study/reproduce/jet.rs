@@ -114,18 +114,25 @@ impl Jet {
         }
     }
 
-    /// How many grains of the jet pass, on average, within a diameter of any line along it: π d² N / A. That many collisions would a grain
-    /// have that hits first and rebounds straight through all others.
+    /// How many others pass, on average, within a diameter of the line along which a grain flies: π d² (N - 1) / A. That many collisions
+    /// would a grain have that hits first and rebounds straight through all others.
     #[must_use]
     pub fn crowding(&self) -> f64 {
-        PI * self.diameter().powi(2) * self.grains as f64 / self.width.powi(2)
+        self.crowding_of(self.grains as f64)
+    }
+
+    /// The same with so many grains.
+    #[must_use]
+    pub fn crowding_of(&self, grains: f64) -> f64 {
+        PI * self.diameter().powi(2) * (grains - 1.0) / self.width.powi(2)
     }
 
     /// The exponent of first-order shielding over a height `overlap` (m) in which the stream and what rebounds from it overlap, laterally
     /// without end: π d² n H (1 + e) / e, with n the number density of the stream.
     #[must_use]
     pub fn shielding(&self, overlap: f64) -> f64 {
-        self.crowding() * overlap / self.length * (1.0 + self.restitution) / self.restitution
+        let density = self.grains as f64 / (self.width.powi(2) * self.length);
+        PI * self.diameter().powi(2) * density * overlap * (1.0 + self.restitution) / self.restitution
     }
 }
 
@@ -220,9 +227,9 @@ mod tests {
         assert!(check(&jet.scene()).is_ok());
         // n = 5000 / m³, d = 0.02 m, H = 0.1 m, e = 0.8: 1.41
         approx::assert_relative_eq!(jet.shielding(0.1), 1.414, max_relative = 1e-3);
-        // Over all of its length, as far as rebounding grains get before it ends: no restitution is left in it.
+        // As far as the first rebounding grain gets before the jet ends it meets all others, whatever the restitution.
         let far = jet.length * jet.restitution / (1.0 + jet.restitution);
-        approx::assert_relative_eq!(jet.shielding(far), jet.crowding(), max_relative = 1e-14);
+        approx::assert_relative_eq!(jet.shielding(far) * 499.0 / 500.0, jet.crowding(), max_relative = 1e-14);
     }
 
     #[test]

@@ -1,14 +1,14 @@
 //! What papers state, put to the test: each study computes numbers, pictures and a verdict.
 //!
-//! A study is a file here and a line in [`STUDIES`]. It gets [`Settings`] and gives a [`Report`]; it reads no file and writes none.
+//! A study is a file here (named after the paper's number and its figure) and a line in [`STUDIES`]. It gets [`Settings`] and gives a [`Report`]; it reads no file and writes none.
 //! What studies share: [`run_all`] (many runs on all cores, in a fixed order), [`Estimate`] (a mean and how sure it is),
 //! [`Chart`] and [`Map`] (pictures as data), [`Jet`] (the reference jet) and [`Sequence`] (two grains and a wall, in closed form).
 
 mod ensemble;
-mod fig18;
-mod fig4;
 mod first_order_or_repeated;
 mod jet;
+mod p002_fig18;
+mod p002_fig4;
 mod report;
 mod sequence;
 mod statistics;
@@ -23,7 +23,13 @@ pub use sequence::Sequence;
 pub use statistics::{Estimate, Slope, crossing};
 
 /// All studies, in the order in which they are listed.
-pub const STUDIES: [&Study; 4] = [&fig4::STUDY, &fig18::STUDY, &two_grains::STUDY, &first_order_or_repeated::STUDY];
+#[rustfmt::skip] // a line for each
+pub const STUDIES: &[&Study] = &[
+    &p002_fig4::STUDY,
+    &p002_fig18::STUDY,
+    &two_grains::STUDY,
+    &first_order_or_repeated::STUDY,
+];
 
 /// One statement and the computation that puts it to the test.
 #[derive(Debug)]
@@ -44,7 +50,7 @@ impl Study {
     /// The study of this name.
     #[must_use]
     pub fn named(name: &str) -> Option<&'static Self> {
-        STUDIES.into_iter().find(|study| study.name == name)
+        STUDIES.iter().copied().find(|study| study.name == name)
     }
 
     /// The study whose name looks most like this one.

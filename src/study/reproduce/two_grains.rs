@@ -7,7 +7,7 @@ use impinge_events::contact_time::STANDSTILL;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::fig4::boundary_of_collapse;
+use super::p002_fig4::boundary_of_collapse;
 use super::{Axis, Error, Map, Picture, Report, Sequence, Settings, Study, Table};
 use crate::grains::{NewGrain, sphere_volume};
 use crate::law::{ContactLaw, Friction};

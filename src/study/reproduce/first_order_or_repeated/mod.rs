@@ -239,17 +239,20 @@ fn limit(errors: &[(f64, Estimate)], level: f64) -> String {
 fn tell_shapes(shapes: &[Series], report: &mut Report) {
     for series in shapes {
         let jet = &series[0][0].jet;
-        let [crowding, shielding] = [jet.crowding(), jet.shielding(0.5 * jet.width)].map(|of| of / jet.grains as f64);
+        let shielding = jet.shielding(0.5 * jet.width) / jet.grains as f64;
         let limit = |level: f64| {
             let percent = 100.0 * level;
             crossing(&errors(series, 1, CARRIED), level).map_or_else(
                 || format!("{percent:.0} % nowhere"),
-                |grains| format!("{percent:.0} % from {} ({:.2}) on", grains * crowding, grains.value * shielding),
+                |grains| {
+                    let crowding = Estimate { value: jet.crowding_of(grains.value), ..grains * jet.crowding_of(2.0) };
+                    format!("{percent:.0} % from {crowding} ({:.2}) on", grains.value * shielding)
+                },
             )
         };
         report.measured(
             format!(
-                "A jet {} m wide and {} m long: a first-order run misses the energy carried, by crowding pi d^2 N / A (in brackets the \
+                "A jet {} m wide and {} m long: a first-order run misses the energy carried, by crowding pi d^2 (N - 1) / A (in brackets the \
                  shielding exponent over half the width), by",
                 jet.width, jet.length
             ),

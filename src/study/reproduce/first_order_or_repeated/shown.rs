@@ -117,7 +117,12 @@ fn table_of_errors(all: &[&Series]) -> Table {
     for (point, model) in
         all.iter().copied().flatten().flat_map(|point| (1..MODELS.len()).map(move |model| (point, model)))
     {
-        let [carried, left, dissipated] = [CARRIED, LEFT, DISSIPATED].map(|quantity| error(point, model, quantity));
+        let [carried, left, dissipated] = [CARRIED, LEFT, DISSIPATED].map(|quantity| {
+            let error = error(point, model, quantity);
+            // Elastic smooth grains dissipate nothing, and nothing can be off by a part of that.
+            let known = |number: f64| if error.value.is_finite() { number.to_string() } else { String::new() };
+            [error.value, error.error].map(known)
+        });
         let jet = &point[model].jet;
         table.row(&[
             &jet.restitution,
@@ -126,12 +131,12 @@ fn table_of_errors(all: &[&Series]) -> Table {
             &jet.length,
             &jet.grains,
             &jet.model(),
-            &carried.value,
-            &carried.error,
-            &left.value,
-            &left.error,
-            &dissipated.value,
-            &dissipated.error,
+            &carried[0],
+            &carried[1],
+            &left[0],
+            &left[1],
+            &dissipated[0],
+            &dissipated[1],
         ]);
     }
     table
@@ -173,7 +178,7 @@ fn limits(all: &[&Series]) -> Table {
                     &level,
                     &grains.value,
                     &grains.error,
-                    &(grains.value * jet.crowding() / jet.grains as f64),
+                    &jet.crowding_of(grains.value),
                 ]);
             }
         }
@@ -233,7 +238,7 @@ fn over_grains(name: &'static str, title: &str, contacts: &[Series], of: impl Fn
         title: title.into(),
         shows: "A block of 0.2 m x 0.2 m x 2.5 m; shown where it is more than twice its standard error".into(),
         x: Axis::log("number of grains", GRAINS[0], GRAINS[1]),
-        y: Axis::log("%", 0.1, 200.0),
+        y: Axis::log("%", 0.1, 500.0),
         lines: contacts.iter().map(line).chain(levels(GRAINS)).collect(),
     }
 }
@@ -241,17 +246,17 @@ fn over_grains(name: &'static str, title: &str, contacts: &[Series], of: impl Fn
 fn error_over_crowding(shapes: &[Series]) -> Chart {
     let line = |(colour, series): (usize, &Series)| {
         let jet = &series[0][0].jet;
-        let per_grain = jet.crowding() / jet.grains as f64;
-        let errors: OverGrains = errors(series, 1, CARRIED).iter().map(|&(n, error)| (n * per_grain, error)).collect();
+        let over_crowding = |&(grains, error): &(f64, Estimate)| (jet.crowding_of(grains), error);
+        let errors: OverGrains = errors(series, 1, CARRIED).iter().map(over_crowding).collect();
         Line::measured(format!("{} m wide, {} m long", jet.width, jet.length), colour, magnitudes(&errors))
     };
-    let range = [0.05, 500.0];
+    let range = [0.02, 500.0];
     Chart {
         name: "error_over_crowding",
         title: "Jets of several shapes: by how much a first-order run misses the energy carried".into(),
         shows: "Restitution 0.8, smooth; shown where it is more than twice its standard error".into(),
-        x: Axis::log("crowding: grains within a diameter of a line along the jet", range[0], range[1]),
-        y: Axis::log("%", 0.1, 200.0),
+        x: Axis::log("crowding: others within a diameter of the way of a grain", range[0], range[1]),
+        y: Axis::log("%", 0.1, 500.0),
         lines: shapes.iter().enumerate().map(line).chain(levels(range)).collect(),
     }
 }
