@@ -9,8 +9,8 @@ use impinge::scheme::{EventDriven, GrainCollision, Observer};
 use impinge_events::NoSurface;
 use nalgebra::Vector3;
 
-/// What some thousand grains instead of infinitely many may change, relative: of the order of 1 / N.
-const FINITE: f64 = 5e-4;
+/// What N grains instead of infinitely many may change, relative, times N.
+const FINITE: f64 = 4.4;
 /// Contact distance of the grains of [`gas`], m; their mass is 1 kg.
 const S: f64 = 1.0;
 
@@ -94,7 +94,7 @@ fn z_kolafa(phi: f64) -> f64 {
 }
 
 /// Rate within 1 % and Z within 0.5 % of Carnahan & Starling, both known well enough for that (three standard errors are less), and within
-/// three standard errors of Carnahan, Starling & Kolafa, give or take [`FINITE`].
+/// three standard errors of Carnahan, Starling & Kolafa, give or take [`FINITE`] / N.
 fn assert_carnahan_starling(cells: u32, phi: f64, collisions: f64) {
     let [rate, z, drift] = elastic(cells, phi, collisions);
     eprintln!("phi = {phi}: rate {rate:?}, Z {z:?}, drift {:e}", drift.0);
@@ -102,7 +102,7 @@ fn assert_carnahan_starling(cells: u32, phi: f64, collisions: f64) {
     let better = [(z_kolafa(phi) - 1.0) / (z_simple - 1.0), z_kolafa(phi) / z_simple];
     for ((what, (ratio, error), tolerance), better) in [("rate", rate, 0.01), ("Z", z, 0.005)].into_iter().zip(better) {
         assert!(
-            (ratio - better).abs() < 3.0 * error + FINITE,
+            (ratio - better).abs() < 3.0 * error + FINITE / f64::from(4 * cells.pow(3)),
             "phi = {phi}: {what} is {ratio} ± {error}, not {better}"
         );
         assert!((ratio - 1.0).abs() < tolerance, "phi = {phi}: {what} is {ratio} ± {error} of theory");
@@ -125,9 +125,10 @@ fn elastic_gas_agrees_with_carnahan_and_starling_over_1e7_collisions() {
     assert_carnahan_starling(13, 0.3, 1e7);
 }
 
-/// Hard case 16 in full.
+/// Hard case 16 in full. Found: rate 1.00283 ± 0.00004, Z 1.00199 ± 0.00004 of Carnahan & Starling (infinitely many grains after Kolafa: 1.00353,
+/// 1.00264; the difference is 1.4 / N), energy drift 1.1e-14 √(collisions), 3.6e-10 in all; 38 minutes of processor time.
 #[test]
-#[ignore = "20 minutes or more: cargo test --release --test gas -- --ignored --nocapture over_1e9"]
+#[ignore = "40 minutes: cargo test --release --test gas -- --ignored --nocapture over_1e9"]
 fn elastic_gas_agrees_with_carnahan_and_starling_over_1e9_collisions() {
     // So few grains that they stay in the cache.
     assert_carnahan_starling(8, 0.3, 1e9);

