@@ -1,6 +1,6 @@
 //! What a collision costs against the number of grains and against the packing fraction: elastic gases, one core, all included.
 //!
-//! `cargo run --release --example collision_cost`; a largest number of grains may be given (1e6 if none is; 1e7 takes half an hour and 5 GB).
+//! `cargo run --release --example collision_cost -- 1e6`; the largest number of grains is 1e4 if none is given, and 1e7 takes half an hour and 5 GB.
 //! Prints the tables of `docs/performance.md` and draws `collision_cost.svg` in the current folder.
 #![expect(clippy::print_stdout, reason = "the figures are what this program is for")]
 
@@ -90,10 +90,10 @@ fn cost(side: u32, fraction: f64) -> Result<(usize, f64), Box<dyn Error>> {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let most: f64 = std::env::args().nth(1).map_or(Ok(1e6), |text| text.parse())?;
+    let most: f64 = std::env::args().nth(1).map_or(Ok(1e4), |text| text.parse())?;
     let mut by_number = [Vec::new(), Vec::new()];
     println!("{:>10} {:>14} {:>14}", "grains", "fraction 0.1", "fraction 0.4");
-    for side in SIDES.into_iter().filter(|&side| 4.0 * f64::from(side).powi(3) <= 1.01 * most) {
+    for side in SIDES.into_iter().filter(|&side| 4.0 * f64::from(side).powi(3) <= 1.1 * most) {
         let [(n, dilute), (_, dense)] = [cost(side, FRACTIONS[0])?, cost(side, FRACTIONS[1])?];
         println!("{n:10} {dilute:11.3} µs {dense:11.3} µs");
         by_number[0].push((n as f64, dilute));

@@ -19,7 +19,7 @@ const RADIUS: f64 = 0.01;
 /// kg/m³
 const DENSITY: f64 = 2500.0;
 /// Looks in a sub-step. No multiple of it is the end of a part.
-const LOOKS: f64 = 2.718;
+const LOOKS: f64 = 2.7;
 
 fn ball(position: Vector3<f64>, velocity: Vector3<f64>, radius: f64, density: f64) -> NewGrain {
     NewGrain { position, velocity, spin: Vector3::zeros(), radius, density, strength: 1.0 }

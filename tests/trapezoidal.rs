@@ -328,7 +328,7 @@ fn a_step_that_does_not_converge_stops_the_run() {
 fn jet(set: &[&str]) -> (Ledger, SurfaceEnergy, Steps) {
     let mut all = vec!["run.scheme=trapezoidal".to_owned(), "source[0].count=500".to_owned()];
     all.extend(set.iter().map(|&set| set.to_owned()));
-    let overrides = Overrides { set: all.into(), ..Overrides::default() };
+    let overrides = Overrides { set: all, ..Overrides::default() };
     let file =
         SceneFile::read("examples/erosive_jet.toml".as_ref(), &overrides).unwrap_or_else(|error| panic!("{error}"));
     let mut simulation = Simulation::new(&file.scene, file.folder()).unwrap_or_else(|error| panic!("{error}"));
