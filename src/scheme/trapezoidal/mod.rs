@@ -14,7 +14,7 @@
 //!
 //! * *Approaching* is meant at the beginning of the step, v(0), and of the two relative to each other; the paper prints v_cn(t) < 0.
 //! * *The impulse* J is that of the law for v(0), once a step. Algorithm 1 takes it anew from each iterate, which has been turned round
-//!   already: its fixed point for a head-on hit at v is -(1 - e)/(3 + e) v, no rebound at all.
+//!   already: a grain that hits the surface head-on at v goes on at (1 - e)/(3 + e) v, its fixed point, and does not rebound at all.
 //! * *The force* is J/h at both ends, so that the step gives J whatever phi: the contact begins and ends within the step, for delta t < h (section 2.2).
 //!   The delta t of the paper, which it gives nowhere, cancels; what forces from outside give during it is left out, as delta t is much shorter
 //!   than h.
@@ -49,7 +49,8 @@ use super::stepped::{Crowd, Method, even};
 use super::{Broken, Observer};
 use crate::scene;
 
-/// Of its radius a grain flies in a step whose length is not given, at the fastest impact of the scene: overlaps stay below that.
+/// Of its radius a grain flies in a step whose length is not given, at the fastest impact of the scene: overlaps with the surface stay below that, and
+/// those of grains below twice that.
 const PART_OF_RADIUS: f64 = 0.05;
 
 /// Sweeps after which a step has no hope of converging: with a near field each takes the same part off the error, and 200 bring it to 1e-9 even
