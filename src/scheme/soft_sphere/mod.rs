@@ -6,7 +6,7 @@
 //!
 //! **Friction.** The paper takes F_t = mu F_n whatever the slip, which chatters and creates energy once a contact sticks. Here the impulse of a step
 //! is what ends the slip of the two, 2/7 m_eff s, and at most mu F_n h: the law of the event-driven scheme
-//! ([`friction`](crate::law::friction)), applied step by step, whose loss has a closed form. A spring along the slip (Mindlin) would give a tangential
+//! (the impulse of `law::friction`), applied step by step, whose loss has a closed form. A spring along the slip (Mindlin) would give a tangential
 //! restitution that hard spheres do not have, and the two schemes would not agree as E grows. With mu_s > mu_d a contact that slips at first
 //! goes on slipping under mu_d until it sticks, where the impulse law compares with mu_s once. Spins take up J_t with its arm, as (3) must have it.
 //!
