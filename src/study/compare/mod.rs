@@ -12,7 +12,7 @@
 //! let options = Options { quick: true, ..Options::default() };
 //! let comparison = Plan::new(&scene, "examples".as_ref(), options)?.run(&mut |_, _| std::ops::ControlFlow::Continue(()))?;
 //! assert_eq!(comparison.reference.regime, Regime::Pointwise);
-//! let exact = comparison.curves[0].entries[0].result.as_ref()?;
+//! let exact = comparison.curves[0].entries[0].result.as_ref().expect("it ran");
 //! assert_eq!((exact.error, exact.lost), (0.0, 0));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
