@@ -207,7 +207,7 @@ mod tests {
     #[test]
     fn without_forces_the_event_driven_scheme_is_one_exact_run() {
         let mut free = scene(&[]);
-        free.near_field = None;
+        (free.near_field, free.run.penetration) = (None, None);
         let (scales, names) = (Scales { sub_step: None, ..SCALES }, ["event-driven".to_owned()]);
         let rungs = ladders(&names).flat_map(|ladder| ladder.rungs(&free, &scales, false));
         let rungs: Vec<_> = rungs.map(|rung| (rung.value, rung.scene)).collect();
@@ -230,7 +230,7 @@ mod tests {
     #[test]
     fn every_setting_of_every_scheme_is_one_that_a_scene_may_have() {
         let mut soft = scene(&[]);
-        soft.near_field = None;
+        (soft.near_field, soft.run.penetration) = (None, None);
         soft.run.scheme = Scheme::SoftSphere;
         soft.soft_sphere = Some(SoftSphere { poisson_ratio: 0.2, ..SoftSphere::default() });
         for (scene, sub_step) in [(scene(&[]), Some(4e-6)), (soft, None)] {
