@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::tables::table;
 use super::{Error, Folder, plots};
-use crate::study::reproduce::{Finding, Picture, Report, Study, Verdict};
+use crate::study::reproduce::{Finding, Report, Study, Verdict};
 
 /// The verdict of a study: on the terminal, in `verdict.md` and in `summary.json`.
 #[derive(Clone, Debug, Serialize)]
@@ -65,9 +65,7 @@ impl Reproduction {
             folder.write(&format!("tables/{}.csv", numbers.name), |file| table(file, numbers.columns, rows()))?;
         }
         for picture in &report.pictures {
-            let (Picture::Chart(crate::study::reproduce::Chart { name, .. })
-            | Picture::Map(crate::study::reproduce::Map { name, .. })) = picture;
-            let name = format!("pictures/{name}.svg");
+            let name = format!("pictures/{}.svg", picture.name());
             let svg = plots::drawn(picture).map_err(folder.failed(&name))?;
             folder.write(&name, |file| file.write_all(svg.as_bytes()))?;
         }

@@ -107,6 +107,17 @@ pub enum Picture {
     Map(Map),
 }
 
+impl Picture {
+    /// Name of its file, without ending.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Chart(chart) => chart.name,
+            Self::Map(map) => map.name,
+        }
+    }
+}
+
 /// How numbers are laid out along an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
