@@ -41,6 +41,38 @@ fn first_encounters<C: Calendar>(domain: Domain) -> Vec<(f64, Encounter)> {
     seen
 }
 
+/// The grain with the highest number was named as one that comes soon, left, and cells were laid out without a place for it.
+#[test]
+fn a_grain_that_had_left_was_fetched_from_where_no_cells_were() {
+    let side = Vector3::repeat(SIDE as f64);
+    let domain = Domain { min: Vector3::zeros(), max: side, periodic: false, planar: false };
+    let mut flights = crowd();
+    let last = flights.len() - 1;
+    for (number, flight) in flights.iter_mut().enumerate() {
+        // Those of the highest numbers leave through the top, the very last as the tenth; ten more in the next epoch.
+        let speed = match last - number {
+            0 => 0.84,
+            before @ 1..10 => 0.9 + 0.01 * before as f64,
+            before @ 10..20 => 0.5 + 0.01 * before as f64,
+            _ => 0.0,
+        };
+        (flight.radius, flight.velocity) = (0.1, Vector3::z() * speed);
+    }
+    let mut encounters = Encounters::<NoSurface>::new(flights, NoSurface, domain);
+    let mut leave = |until: f64| {
+        let mut gone = Vec::new();
+        while let Some((_, Encounter::Exit { grain })) = encounters.next_before(until) {
+            encounters.remove(grain);
+            gone.push(grain as usize);
+        }
+        encounters.start_epoch(until, 10.0);
+        gone
+    };
+    let first = leave(0.6);
+    assert_eq!((first.len(), first[9]), (10, last));
+    assert_eq!(leave(1.0).len(), 10);
+}
+
 /// The plain calendar does not tell who comes: nothing is fetched ahead with it.
 #[test]
 fn fetching_ahead_changes_no_bit_in_a_period() {

@@ -62,11 +62,15 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
                 let axis = (first.kind == Kind::Crossing).then_some(first.partner as u8);
                 cells.region_of_next_search(owner, &self.flights[owner as usize], axis)
             };
-            cells.fetch_cells(region(self.ahead.before_last(BETWEEN_STAGES)));
-            cells.visit_first_in_cells(region(self.ahead.before_last(2 * BETWEEN_STAGES)), |grain| {
-                prefetch(&self.flights, grain as usize);
-                cells.fetch_place(grain);
-            });
+            if let Some(region) = region(self.ahead.before_last(BETWEEN_STAGES)) {
+                cells.fetch_cells(region);
+            }
+            if let Some(region) = region(self.ahead.before_last(2 * BETWEEN_STAGES)) {
+                cells.visit_first_in_cells(region, |grain| {
+                    prefetch(&self.flights, grain as usize);
+                    cells.fetch_place(grain);
+                });
+            }
         }
         self.ahead.coming = coming;
     }

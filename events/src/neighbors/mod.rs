@@ -364,16 +364,17 @@ impl Cells {
         prefetch(&self.links, id as usize);
     }
 
-    /// Where the next search for grain `id` will look: ahead, if it then crosses the side of its cell along `axis`, or else all around. At the
-    /// ends of a period that may be wrong: it serves to fetch from memory.
+    /// Where the next search for grain `id` will look: ahead, if it then crosses the side of its cell along `axis`, or else all around; nowhere if it has
+    /// no place. At the ends of a period that may be wrong: it serves to fetch from memory.
     #[inline]
-    pub(crate) fn region_of_next_search(&self, id: u32, flight: &Flight, axis: Option<u8>) -> Region {
-        let Place { cell, edges } = self.places[id as usize];
-        let number = self.links[id as usize].number;
-        let Some(axis) = axis.map(usize::from) else { return Region { number, edges, wanted: self.around } };
+    pub(crate) fn region_of_next_search(&self, id: u32, flight: &Flight, axis: Option<u8>) -> Option<Region> {
+        // Since it was said to come it may have been taken out, and cells laid out that never saw it.
+        let Place { cell, edges } = *self.places.get(id as usize)?;
+        let number = self.links.get(id as usize)?.number;
+        let Some(axis) = axis.map(usize::from) else { return Some(Region { number, edges, wanted: self.around }) };
         let step = self.way_out(cell, flight, axis).map_or(1, |(step, _)| step);
         let wanted = AHEAD[axis][usize::from(step > 0)] & self.around;
-        Region { number: number.wrapping_add(self.layout.along(axis, step)), edges, wanted }
+        Some(Region { number: number.wrapping_add(self.layout.along(axis, step)), edges, wanted })
     }
 
     /// Asks the memory for the cells of a region.
