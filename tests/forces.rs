@@ -136,6 +136,17 @@ fn case_20_attraction_presses_a_cluster_together() {
     }
 }
 
+/// Without friction the grains of a cluster slide and rock until nothing but its rotation is left, and then nobody hits anybody any more.
+#[test]
+fn smooth_clusters_come_to_rest_for_good() {
+    for (restitution, step) in [(0.0, 2e-3), (0.5, 2e-3), (0.9, 2e-3), (0.5, 1e-3)] {
+        let outcome = cluster(smooth(restitution, restitution)).run(step, 25.0);
+        let late = outcome.log.0.iter().filter(|hit| time_of(hit) > 20.0).count();
+        assert!(outcome.log.0.len() > 1000, "e = {restitution}: {} hits", outcome.log.0.len());
+        assert_eq!(late, 0, "e = {restitution}, sub-step {step}: hits at rest");
+    }
+}
+
 /// A lossless run of `hits` collisions at least: the largest error of its energy at any of a thousand looks, and the mean error in its first and in its last
 /// tenth, J.
 fn long_run(scene: &Scene, step: f64, until: f64, hits: usize) -> (f64, [f64; 2]) {

@@ -9,7 +9,8 @@ use impinge::grains::NewGrain;
 use impinge::law::NearField;
 use impinge::observe::Ledger;
 use impinge::scene::DEFAULT_PENETRATION;
-use impinge::scheme::{Laws, Length, SubSteps};
+use impinge::scheme::{Laws, Length, SubSteps, Substepped};
+use impinge::surface::Surface;
 use nalgebra::Vector3;
 use rand::{RngExt as _, SeedableRng as _};
 
@@ -51,7 +52,7 @@ struct Found {
 }
 
 /// Deepest overlap of any two grains at `time` (s), over the smaller radius.
-fn deepest(scene: &Scene, run: &impinge::scheme::Substepped<impinge::surface::Surface>, time: f64) -> f64 {
+fn deepest(scene: &Scene, run: &Substepped<Surface>, time: f64) -> f64 {
     let states = states(run, time);
     let overlaps = states.iter().enumerate().flat_map(|(k, (one, _))| {
         states[..k].iter().map(move |(other, _)| {

@@ -119,14 +119,16 @@ pub(super) struct Bends<'a> {
 }
 
 impl Bends<'_> {
-    /// How deep grains may go into each other in the next sub-step, over `penetration`, which is over the smaller radius; where there are contacts at
-    /// rest, `yielding` is the largest acceleration without them (m/s²), which says how much these yield, and 0 else.
-    pub(super) fn deepest(&self, vicinity: &mut Vicinity<'_>, yielding: f64, penetration: f64) -> f64 {
+    /// How deep grains may go into each other in the next sub-step, over `penetration`, which is over the smaller radius.
+    ///
+    /// Where there are contacts at rest, `pressing` is the largest acceleration without them (m/s²), and 0 else: when chords depart from paths
+    /// by more than `penetration`, contacts at rest are looked for much farther apart than they may be.
+    pub(super) fn deepest(&self, vicinity: &mut Vicinity<'_>, pressing: f64, penetration: f64) -> f64 {
         let sag = 0.125 * self.step * self.step;
         let inside = || (0..).zip(self.flights).filter(|(_, flight)| flight.radius > 0.0);
         let smallest = inside().map(|(_, flight)| flight.radius).fold(f64::INFINITY, f64::min);
-        let mut deepest = yielding * sag / (most_sag(penetration) * smallest);
-        // What two grains that bend less can do is left to any pair.
+        let mut deepest = pressing * sag / (penetration * smallest);
+        // What two grains that bend less make together is little enough for any pair.
         let least = 0.5 * LEAST_SHARE * penetration * smallest;
         for (grain, flight) in inside() {
             if (self.accelerations[grain as usize] - self.gravity).norm() * sag > least {

@@ -462,8 +462,8 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
                     return 0.0;
                 }
                 let bends = Bends { flights, accelerations, gravity, ended, step };
-                let yielding = if resting.is_empty() { 0.0 } else { strongest };
-                bends.deepest(vicinity, yielding, penetration)
+                let pressing = if resting.is_empty() { 0.0 } else { strongest };
+                bends.deepest(vicinity, pressing, penetration)
             });
             length = step;
             let both = 0.5 * (ended + step);

@@ -1,11 +1,10 @@
 //! The impulses of a step.
 
 use impinge_events::SurfaceContact;
-use impinge_events::contact_time::APPROACH_ROUNDING;
 use nalgebra::Vector3;
 
 use crate::law::{Body, resolve_pair, resolve_surface};
-use crate::scheme::stepped::{Crowd, Near};
+use crate::scheme::stepped::{Crowd, Near, approaches};
 use crate::scheme::{Broken, Observer};
 
 /// Finds the contacts at the beginning of a step and lets them act.
@@ -46,7 +45,7 @@ impl Contacts {
             let before = pair.map(|slot| crowd.body(slot));
             let contact = resolve_pair(&crowd.laws().grain, &before[0], &before[1], near.normal);
             let speeds = before[0].velocity.amax() + before[1].velocity.amax();
-            if contact.approach_speed > APPROACH_ROUNDING * speeds && !crowd.shields(*pair) {
+            if approaches(contact.approach_speed, speeds) && !crowd.shields(*pair) {
                 for k in [0, 1] {
                     self.changes.push(Change::of(pair[k], &before[k], &contact.after[k]));
                 }
@@ -63,7 +62,7 @@ impl Contacts {
                 let before = crowd.body(slot);
                 let resolved = resolve_surface(&crowd.laws().surface, &before, contact.normal, contact.velocity);
                 let speeds = before.velocity.amax() + contact.velocity.amax();
-                if resolved.approach_speed > APPROACH_ROUNDING * speeds && crowd.may_hit(slot) {
+                if approaches(resolved.approach_speed, speeds) && crowd.may_hit(slot) {
                     self.changes.push(Change::of(slot, &before, &resolved.after));
                     crowd.tell_surface_impulse(slot, (element, contact), &before, &resolved, 0.0, observer);
                 }

@@ -64,7 +64,7 @@ use std::ops::ControlFlow;
 pub use self::comparator::Comparator;
 pub use self::crowd::{Crowd, Near};
 pub use self::passages::{GONE, retain};
-pub use self::record::energies;
+pub use self::record::{approaches, energies};
 use super::{Broken, Observer, Progress};
 use crate::grains::NewGrain;
 

@@ -1,6 +1,7 @@
 //! What observers are told of impulses.
 
 use impinge_events::SurfaceContact;
+use impinge_events::contact_time::APPROACH_ROUNDING;
 
 use super::{Crowd, Near};
 use crate::law::{Body, PairImpulse, SurfaceImpulse};
@@ -65,6 +66,13 @@ impl Crowd {
         };
         self.tell_hit(slot, &hit, observer);
     }
+}
+
+/// Whether a normal speed of approach (m/s) is more than the rounding of the speeds that it is the difference of: grains that e = 0 has stopped
+/// against each other would go on colliding as long as they overlap.
+#[must_use]
+pub fn approaches(approach: f64, speeds: f64) -> bool {
+    approach > APPROACH_ROUNDING * speeds
 }
 
 /// Kinetic energy (J) that a grain brings to the surface, relative to it: along the normal, across it, and in its rotation.

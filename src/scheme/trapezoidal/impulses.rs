@@ -1,12 +1,11 @@
 //! The contacts of one step and their impulses.
 
 use impinge_events::SurfaceContact;
-use impinge_events::contact_time::APPROACH_ROUNDING;
 use nalgebra::Vector3;
 use rustc_hash::FxHashSet;
 
 use crate::law::{Body, resolve_pair, resolve_surface};
-use crate::scheme::stepped::Crowd;
+use crate::scheme::stepped::{Crowd, approaches};
 use crate::scheme::{Broken, Observer};
 
 /// The surface as the partner of a grain.
@@ -109,10 +108,4 @@ impl Impulses {
             crowd.grains[slot as usize].spin += jump.spin;
         }
     }
-}
-
-/// Whether a normal speed of approach (m/s) is more than the rounding of the speeds that it is the difference of: grains that e = 0 has stopped
-/// against each other would go on colliding as long as they overlap.
-fn approaches(approach: f64, speeds: f64) -> bool {
-    approach > APPROACH_ROUNDING * speeds
 }
