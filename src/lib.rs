@@ -20,6 +20,7 @@
 //! Data flows one way: [`scene`] (what the user wrote) → [`source`], [`surface`], [`law`] → [`scheme`] (advances time) → [`observe`] (measures) →
 //! [`output`] (writes). [`simulation`] puts a scene together and runs it; a [`study`] runs many. Everything is in SI units.
 
+pub mod estimate;
 pub mod grains;
 pub mod law;
 pub mod near_field;
@@ -27,6 +28,7 @@ pub mod observe;
 pub mod output;
 pub mod scene;
 pub mod scheme;
+pub mod shown;
 pub mod simulation;
 pub mod source;
 pub mod study;

@@ -20,6 +20,7 @@ pub(crate) mod fake_jet;
 mod forces;
 mod history;
 mod ledger;
+pub mod measure;
 mod surface_energy;
 mod surface_map;
 

@@ -12,7 +12,7 @@ use tempfile::TempDir;
 use super::Error;
 
 /// Every name that a run or a study may write; a folder with anything else in it is never replaced.
-const NAMES: [&str; 18] = [
+const NAMES: [&str; 19] = [
     "summary.json",
     "grains.csv",
     "events.csv",
@@ -31,6 +31,7 @@ const NAMES: [&str; 18] = [
     "verdict.md",
     "tables",
     "pictures",
+    "measures",
 ];
 
 /// A folder of results in the making.

@@ -5,6 +5,7 @@
 mod comparison;
 mod error;
 mod folder;
+mod measures;
 pub mod plots;
 mod recorder;
 mod reproduction;

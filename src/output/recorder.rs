@@ -8,8 +8,9 @@ use impinge_events::Flight;
 
 use super::plots::{self, SideView};
 use super::tables::{write_grains, write_series, write_surface_hits};
-use super::{Error, EventTable, Folder, Summary, vtk};
+use super::{Error, EventTable, Folder, Summary, measures, vtk};
 use crate::grains::{Grain, Snapshot};
+use crate::observe::measure::{Measurement, measurements};
 use crate::observe::{History, Ledger, SurfaceEnergy, SurfaceMap, SurfaceShape};
 use crate::scene::{Radius, Scene};
 use crate::scheme::stepped::Steps;
@@ -44,6 +45,7 @@ pub struct Recorder {
     surface: SurfaceEnergy,
     map: SurfaceMap,
     history: History,
+    measures: Vec<(String, Box<dyn Measurement>)>,
     side_view: SideView,
     events: Option<EventTable>,
     frames: Vec<(f64, String)>,
@@ -90,6 +92,7 @@ impl Recorder {
             surface: SurfaceEnergy::default(),
             map: SurfaceMap::new(&shape, mean_radius),
             history: History::default(),
+            measures: measurements(scene),
             side_view: SideView::new(scene),
             events,
             frames: Vec::new(),
@@ -169,6 +172,9 @@ impl Recorder {
             let domain = &self.scene.domain;
             folder.write("surface.vtp", |file| vtk::write_surface(file, &self.shape, &self.map, domain))?;
         }
+        for (name, measure) in &self.measures {
+            measures::write(folder, name, &measure.results(), self.scene.output.pictures)?;
+        }
         if self.scene.output.pictures { self.write_pictures() } else { Ok(()) }
     }
 
@@ -209,6 +215,7 @@ impl Recorder {
 impl Observer for Recorder {
     fn grain_collision(&mut self, collision: &GrainCollision) {
         self.ledger.grain_collision(collision);
+        self.measures.iter_mut().for_each(|(_, measure)| measure.grain_collision(collision));
         if let Some(events) = &mut self.events {
             events.grain_collision(collision);
         }
@@ -218,6 +225,7 @@ impl Observer for Recorder {
         self.ledger.surface_hit(hit);
         self.surface.surface_hit(hit);
         self.map.surface_hit(hit);
+        self.measures.iter_mut().for_each(|(_, measure)| measure.surface_hit(hit));
         if let Some(events) = &mut self.events {
             events.surface_hit(hit);
         }
@@ -225,20 +233,24 @@ impl Observer for Recorder {
 
     fn kick(&mut self, kick: &Kick) {
         self.ledger.kick(kick);
+        self.measures.iter_mut().for_each(|(_, measure)| measure.kick(kick));
     }
 
     fn rest(&mut self, rest: &Rest) {
         self.ledger.rest(rest);
+        self.measures.iter_mut().for_each(|(_, measure)| measure.rest(rest));
     }
 
     fn passage(&mut self, passage: Passage, time: f64, flight: &Flight, grain: &Grain) {
         self.ledger.passage(passage, time, flight, grain);
+        self.measures.iter_mut().for_each(|(_, measure)| measure.passage(passage, time, flight, grain));
     }
 
     fn sample(&mut self, snapshot: &Snapshot<'_>) {
         self.ledger.sample(snapshot);
         self.history.note(snapshot.time, &self.ledger, &self.surface);
         self.side_view.sample(snapshot);
+        self.measures.iter_mut().for_each(|(_, measure)| measure.sample(snapshot));
         self.last.time = snapshot.time;
         self.last.flights.clear();
         self.last.flights.extend_from_slice(snapshot.flights);

@@ -1,5 +1,5 @@
-//! Files for ParaView: PolyData in XML (`.vtp`), its arrays compressed by zlib and appended raw, and the collection
-//! (`.pvd`) that gives each frame its time.
+//! Files for ParaView: PolyData (`.vtp`) and ImageData (`.vti`) in XML, their arrays compressed by zlib and appended raw, and the
+//! collection (`.pvd`) that gives each frame its time.
 //!
 //! Format: VTK file formats, "XML file formats", version 1.0 with 64-bit headers.
 
@@ -10,6 +10,7 @@ use flate2::write::ZlibEncoder;
 use nalgebra::Vector3;
 
 use crate::grains::{Snapshot, kinetic_energy};
+use crate::observe::measure::{Fields, Grid};
 use crate::observe::{PlaneMap, SurfaceMap, SurfaceShape, Tally};
 use crate::scene::Domain;
 
@@ -92,6 +93,10 @@ impl PolyData {
     fn write(self, out: &mut dyn Write) -> io::Result<()> {
         let (vertices, polygons) = (self.vertices.ends.len(), self.polygons.ends.len());
         let points = Values::vectors(self.points.iter());
+        let piece = format!(
+            r#"NumberOfPoints="{}" NumberOfVerts="{vertices}" NumberOfLines="0" NumberOfStrips="0" NumberOfPolys="{polygons}""#,
+            self.points.len()
+        );
         let sections = [
             ("Points", vec![Array::new("points", 3, points)]),
             ("Verts", self.vertices.arrays().into()),
@@ -99,31 +104,58 @@ impl PolyData {
             ("PointData", self.of_points),
             ("CellData", self.of_cells),
         ];
-        let mut appended = Vec::new();
-        writeln!(
-            out,
-            r#"<?xml version="1.0"?>
-<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64" compressor="vtkZLibDataCompressor">
-<PolyData>
-<Piece NumberOfPoints="{}" NumberOfVerts="{vertices}" NumberOfLines="0" NumberOfStrips="0" NumberOfPolys="{polygons}">"#,
-            self.points.len()
-        )?;
-        for (section, arrays) in sections {
-            writeln!(out, "<{section}>")?;
-            for Array { name, components, values } in arrays {
-                let (kind, offset) = (values.kind(), appended.len());
-                writeln!(
-                    out,
-                    r#"<DataArray type="{kind}" Name="{name}" NumberOfComponents="{components}" format="appended" offset="{offset}"/>"#
-                )?;
-                append(&mut appended, &values.bytes())?;
-            }
-            writeln!(out, "</{section}>")?;
-        }
-        write!(out, "</Piece>\n</PolyData>\n<AppendedData encoding=\"raw\">\n_")?;
-        out.write_all(&appended)?;
-        write!(out, "\n</AppendedData>\n</VTKFile>\n")
+        write_data(out, "PolyData", "", &piece, sections)
     }
+}
+
+/// Writes one piece of a data set, its arrays appended.
+fn write_data(
+    out: &mut dyn Write,
+    kind: &str,
+    attributes: &str,
+    piece: &str,
+    sections: impl IntoIterator<Item = (&'static str, Vec<Array>)>,
+) -> io::Result<()> {
+    let mut appended = Vec::new();
+    writeln!(
+        out,
+        r#"<?xml version="1.0"?>
+<VTKFile type="{kind}" version="1.0" byte_order="LittleEndian" header_type="UInt64" compressor="vtkZLibDataCompressor">
+<{kind}{attributes}>
+<Piece {piece}>"#
+    )?;
+    for (section, arrays) in sections {
+        writeln!(out, "<{section}>")?;
+        for Array { name, components, values } in arrays {
+            let (kind, offset) = (values.kind(), appended.len());
+            writeln!(
+                out,
+                r#"<DataArray type="{kind}" Name="{name}" NumberOfComponents="{components}" format="appended" offset="{offset}"/>"#
+            )?;
+            append(&mut appended, &values.bytes())?;
+        }
+        writeln!(out, "</{section}>")?;
+    }
+    write!(out, "</Piece>\n</{kind}>\n<AppendedData encoding=\"raw\">\n_")?;
+    out.write_all(&appended)?;
+    write!(out, "\n</AppendedData>\n</VTKFile>\n")
+}
+
+/// Writes values in the cells of a grid.
+///
+/// # Errors
+/// Those of `out`.
+pub fn write_fields(out: &mut dyn Write, fields: &Fields) -> io::Result<()> {
+    let Grid { min, cells: [nx, ny, nz], .. } = fields.grid;
+    let extent = format!("0 {nx} 0 {ny} 0 {nz}");
+    let vector = |[x, y, z]: [f64; 3]| format!("{x:?} {y:?} {z:?}");
+    let attributes =
+        format!(r#" WholeExtent="{extent}" Origin="{}" Spacing="{}""#, vector(min), vector(fields.grid.spacing()));
+    let arrays = fields
+        .arrays
+        .iter()
+        .map(|(name, components, values)| Array::new(name, *components, Values::scalars(values.iter().copied())));
+    write_data(out, "ImageData", &attributes, &format!(r#"Extent="{extent}""#), [("CellData", arrays.collect())])
 }
 
 /// Appends an array: number of blocks, size of a block, size of the last if it is shorter, compressed sizes, blocks.

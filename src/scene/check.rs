@@ -5,7 +5,7 @@ use toml::Value;
 use super::limits::{Checked, LARGEST, in_plane, not_negative, positive};
 use super::{
     Arrangement, Boundary, Contact, Distribution, Domain, Friction, Interference, Invalid, Radius, Scene, Source,
-    Surface, forces, stepped,
+    Surface, forces, measure, stepped,
 };
 
 /// Most grains that blocks and lattices of one scene may ask for. At the 600 bytes that a grain costs they fill 60 GB; more is
@@ -40,6 +40,7 @@ pub fn check(scene: &Scene) -> Checked {
     resolved(scene)?;
     forces::check(scene)?;
     stepped::check(scene)?;
+    measure::check(scene)?;
     if scene.domain.planar { planar(scene) } else { Ok(()) }
 }
 

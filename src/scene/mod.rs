@@ -10,6 +10,7 @@ mod forces;
 mod key;
 mod limits;
 mod load;
+mod measure;
 mod near_field;
 mod shape;
 mod stepped;
@@ -23,6 +24,7 @@ pub use contact::{Collapse, Contact, Contacts, Friction, Regularised, StaticDyna
 pub use error::{Invalid, SceneError};
 pub(crate) use limits::{LARGEST, SMALLEST};
 pub use load::{Overrides, SceneFile};
+pub use measure::{FlowMeasure, Measure, Span};
 pub use near_field::{Auto, DEFAULT_PENETRATION, NearField, Substep, Summation};
 pub use shape::schema;
 pub use stepped::{FixedPoint, SoftSphere, Trapezoidal};
@@ -63,6 +65,9 @@ pub struct Scene {
     /// What grains hit.
     #[serde(default)]
     pub surface: Vec<Surface>,
+    /// What else is measured.
+    #[serde(default)]
+    pub measure: Vec<Measure>,
     /// What is written.
     #[serde(default)]
     pub output: Output,

@@ -13,7 +13,7 @@ use super::{
     Area, BLUE, Drawn, FAINT, FINE, FRAME, GREEN, HEADING, INK, MUTED, ORANGE, PURPLE, SKY, colour_bar, colour_of,
     fine, part, picture, style, tick, write,
 };
-use crate::study::reproduce::{Axis, Line, Map, Mark, Picture, Scale};
+use crate::shown::{Axis, Line, Map, Mark, Picture, Scale};
 
 /// Of a chart with its key, pixels.
 const CHART: [i32; 2] = [900, 520];
@@ -218,7 +218,8 @@ fn draw_map(area: &Area<'_>, map: &Map) -> Drawn {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::reproduce::{Chart, Estimate};
+    use crate::estimate::Estimate;
+    use crate::shown::Chart;
 
     #[test]
     fn a_chart_shows_its_error_bars_and_leaves_out_what_is_outside() {

@@ -1,7 +1,7 @@
 //! One run: what it comes to, and the time it takes.
 
 use std::ops::ControlFlow;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use cpu_time::ProcessTime;
 use impinge_events::Flight;
@@ -14,8 +14,8 @@ use crate::scheme::{Broken, Observer, Passage, Progress};
 use crate::simulation::Simulation;
 use crate::surface::Surface;
 
-/// How often a run is asked whether its time is over: seldom enough that asking costs it nothing.
-const LOOK_AT_BUDGET: Duration = Duration::from_millis(5);
+/// How often a run is asked whether its time is over, s: seldom enough that asking costs it nothing. A shorter budget is looked at as often as it is long.
+const LOOK_AT_BUDGET: f64 = 5e-3;
 
 /// What is compared of runs in which single grains cannot be compared.
 pub const QUANTITIES: [&str; 7] = [
@@ -91,7 +91,7 @@ pub(super) fn run(
         if watch(&progress).is_break() {
             return ControlFlow::Break(());
         }
-        if looked.elapsed() < LOOK_AT_BUDGET {
+        if looked.elapsed().as_secs_f64() < LOOK_AT_BUDGET.min(budget) {
             return ControlFlow::Continue(());
         }
         looked = Instant::now();

@@ -2,7 +2,8 @@
 
 use std::f64::consts::PI;
 
-use super::{Error, Estimate, Settings, run_all};
+use super::{Error, Settings, run_all};
+use crate::estimate::Estimate;
 use crate::grains::sphere_volume;
 use crate::observe::{Ledger, SurfaceEnergy};
 use crate::scene::{Interference, Scene};

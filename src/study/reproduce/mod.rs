@@ -1,8 +1,8 @@
 //! What papers state, put to the test: each study computes numbers, pictures and a verdict.
 //!
 //! A study is a file here (named after the paper's number and its figure) and a line in [`STUDIES`]. It gets [`Settings`] and gives a [`Report`]; it reads no file and writes none.
-//! What studies share: [`run_all`] (many runs on all cores, in a fixed order), [`Estimate`] (a mean and how sure it is),
-//! [`Chart`] and [`Map`] (pictures as data), [`Jet`] (the reference jet) and [`Sequence`] (two grains and a wall, in closed form).
+//! What studies share: [`run_all`] (many runs on all cores, in a fixed order), [`Estimate`](crate::estimate::Estimate) (a mean and how sure it is),
+//! [`shown`](crate::shown) (tables and pictures as data), [`Jet`] (the reference jet) and [`Sequence`] (two grains and a wall, in closed form).
 
 mod ensemble;
 mod first_order_or_repeated;
@@ -11,16 +11,14 @@ mod p002_fig18;
 mod p002_fig4;
 mod report;
 mod sequence;
-mod statistics;
 mod two_grains;
 
 use std::ops::ControlFlow;
 
 pub use ensemble::{Error, run_all};
 pub use jet::{Energies, Jet};
-pub use report::{Axis, Chart, Finding, Line, Map, Mark, Picture, Report, Scale, Table, Verdict};
+pub use report::{Finding, Report, Verdict};
 pub use sequence::Sequence;
-pub use statistics::{Estimate, Slope, crossing};
 
 /// All studies, in the order in which they are listed.
 #[rustfmt::skip] // a line for each

@@ -1,8 +1,10 @@
 //! Paper 002, figure 18: does the energy that reaches the surface fall exponentially with the flux?
 
 use super::jet::{Copies, run_copies};
-use super::{Axis, Chart, Error, Estimate, Jet, Line, Mark, Picture, Report, Settings, Slope, Study, Table};
+use super::{Error, Jet, Report, Settings, Study};
+use crate::estimate::{Estimate, Slope};
 use crate::scene::Interference;
+use crate::shown::{Axis, Chart, Line, Mark, Picture, Table};
 
 pub(super) const STUDY: Study = Study {
     name: "002-fig18",

@@ -1,6 +1,7 @@
 //! Paper 002, figure 4: energy that two grains and a wall lose, by first-order collisions and by "all" collisions.
 
-use super::{Axis, Chart, Error, Line, Map, Mark, Picture, Report, Sequence, Settings, Study, Table};
+use super::{Error, Report, Sequence, Settings, Study};
+use crate::shown::{Axis, Chart, Line, Map, Mark, Picture, Table};
 
 pub(super) const STUDY: Study = Study {
     name: "002-fig4",

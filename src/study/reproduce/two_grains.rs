@@ -8,12 +8,13 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::p002_fig4::boundary_of_collapse;
-use super::{Axis, Error, Map, Picture, Report, Sequence, Settings, Study, Table};
+use super::{Error, Report, Sequence, Settings, Study};
 use crate::grains::{NewGrain, sphere_volume};
 use crate::law::{ContactLaw, Friction};
 use crate::observe::{Ledger, SurfaceEnergy};
 use crate::scene::{Collapse, Interference, PlaneSurface};
 use crate::scheme::{EventDriven, Laws};
+use crate::shown::{Axis, Map, Picture, Table};
 use crate::surface::Surface;
 
 pub(super) const STUDY: Study = Study {

@@ -3,7 +3,8 @@
 mod shown;
 
 use super::jet::{Copies, run_copies};
-use super::{Energies, Error, Estimate, Jet, Report, Settings, Study, crossing};
+use super::{Energies, Error, Jet, Report, Settings, Study};
+use crate::estimate::{Estimate, crossing};
 use crate::scene::Interference;
 
 pub(super) const STUDY: Study = Study {

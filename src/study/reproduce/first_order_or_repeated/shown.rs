@@ -2,7 +2,8 @@
 
 use super::{CARRIED, DISSIPATED, LEFT, LEVELS, MODELS, OverGrains, Point, Series};
 use super::{contact_of, error, errors, grains, share_of_repeated};
-use crate::study::reproduce::{Axis, Chart, Estimate, Line, Mark, Picture, Table, crossing};
+use crate::estimate::{Estimate, crossing};
+use crate::shown::{Axis, Chart, Line, Mark, Picture, Table};
 
 /// Numbers of grains along the axes of charts.
 const GRAINS: [f64; 2] = [2.0, 8000.0];

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::observe::Sum;
+use crate::sum::Sum;
 
 /// A number and its standard error.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
