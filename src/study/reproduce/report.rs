@@ -22,20 +22,22 @@ impl Report {
         self.findings.push(Finding { claim: claim.into(), measured: measured.into(), verdict });
     }
 
+    /// Notes a claim that the errors are too wide to decide.
+    pub fn undecided(&mut self, claim: impl Into<String>, measured: impl Into<String>) {
+        self.findings.push(Finding { claim: claim.into(), measured: measured.into(), verdict: Verdict::Undecided });
+    }
+
     /// Notes what was measured where nobody claims anything.
     pub fn measured(&mut self, what: impl Into<String>, measured: impl Into<String>) {
         self.findings.push(Finding { claim: what.into(), measured: measured.into(), verdict: Verdict::Measured });
     }
 
-    /// Whether all that was put to the test agrees.
+    /// Whether all that was put to the test agrees: one claim that differs is enough, and one that is not decided leaves the whole undecided.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
         let is = |verdict| self.findings.iter().any(|finding| finding.verdict == verdict);
-        match (is(Verdict::Differs), is(Verdict::Agrees)) {
-            (true, _) => Verdict::Differs,
-            (false, true) => Verdict::Agrees,
-            (false, false) => Verdict::Measured,
-        }
+        let heaviest = [Verdict::Differs, Verdict::Undecided, Verdict::Agrees].into_iter().find(|&verdict| is(verdict));
+        heaviest.unwrap_or(Verdict::Measured)
     }
 }
 
@@ -58,6 +60,8 @@ pub enum Verdict {
     Agrees,
     /// It is not.
     Differs,
+    /// The errors are too wide to tell.
+    Undecided,
     /// Nothing is claimed.
     Measured,
 }
@@ -67,6 +71,7 @@ impl Display for Verdict {
         f.write_str(match self {
             Self::Agrees => "agrees",
             Self::Differs => "differs",
+            Self::Undecided => "undecided",
             Self::Measured => "measured",
         })
     }
@@ -83,6 +88,8 @@ mod tests {
         assert_eq!(report.verdict(), Verdict::Measured);
         report.put_to_the_test("b", "2", true);
         assert_eq!(report.verdict(), Verdict::Agrees);
+        report.undecided("e", "5");
+        assert_eq!(report.verdict(), Verdict::Undecided);
         report.put_to_the_test("c", "3", false);
         report.put_to_the_test("d", "4", true);
         assert_eq!(report.verdict(), Verdict::Differs);
