@@ -36,8 +36,6 @@ pub(super) struct Acceptance {
     terms: [Growth; 2],
     /// C(n, k).
     binomials: [[f64; MAX_ORDER + 1]; MAX_ORDER + 1],
-    /// The orders that are tried, at most.
-    highest: usize,
 }
 
 /// How the Taylor terms of a force r^-beta grow towards its source.
@@ -74,19 +72,18 @@ struct Distance {
 }
 
 impl Acceptance {
-    pub(super) fn new(law: &NearField, tolerance: f64, filling: f64, highest: usize) -> Self {
+    pub(super) fn new(law: &NearField, tolerance: f64, filling: f64) -> Self {
         let orders: [usize; MAX_ORDER + 1] = std::array::from_fn(|n| n);
         Self {
             half_tolerance: 0.5 * tolerance,
             filling,
             terms: [law.attraction(), law.repulsion()].map(Growth::of),
             binomials: orders.map(|n| orders.map(|k| binomial(n, k))),
-            highest,
         }
     }
 
-    /// The lowest order that is good enough both ways; none if the cells are too close.
-    pub(super) fn order(&self, law: &NearField, one: &Cell, other: &Cell) -> Option<usize> {
+    /// The lowest order up to the `highest` that is good enough both ways; none if the cells are too close.
+    pub(super) fn order(&self, law: &NearField, highest: usize, one: &Cell, other: &Cell) -> Option<usize> {
         let r = (one.centre - other.centre).norm();
         let reach = one.radius + other.radius;
         if reach >= r {
@@ -99,7 +96,7 @@ impl Acceptance {
         let good = |order: usize| {
             self.error(order, distance, one, other) <= limits[0] && self.error(order, distance, other, one) <= limits[1]
         };
-        good(self.highest).then(|| (1..self.highest).find(|&order| good(order)).unwrap_or(self.highest))
+        good(highest).then(|| (1..highest).find(|&order| good(order)).unwrap_or(highest))
     }
 
     /// Bound of the error per unit of strength of the sources, over the force at the distance `r` of the centres (m).

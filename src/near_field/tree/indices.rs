@@ -36,7 +36,6 @@ impl Indices {
     pub(super) fn up_to(degree: usize) -> Self {
         let of_degree = |n: usize| (0..=n).rev().flat_map(move |a| (0..=n - a).rev().map(move |b| [a, b, n - a - b]));
         let all: Vec<[usize; 3]> = (0..=degree).flat_map(of_degree).collect();
-        let find = |k: [usize; 3]| all.iter().position(|other| *other == k).expect("of lower degree");
         let counts: Vec<usize> = (0..=degree).map(|n| (n + 1) * (n + 2) * (n + 3) / 6).collect();
         let below = |n: usize| if n > degree { 0 } else { counts[degree - n] };
         let plus = |k: [usize; 3], l: [usize; 3]| find([k[0] + l[0], k[1] + l[1], k[2] + l[2]]);
@@ -45,7 +44,7 @@ impl Indices {
         Self {
             degree,
             degrees: all.iter().map(sum).collect(),
-            steps: all.iter().map(|&k| step(k, find)).collect(),
+            steps: all.iter().copied().map(step).collect(),
             sums: all.iter().map(|&l| all[..below(sum(&l))].iter().map(|&k| plus(k, l) as u16).collect()).collect(),
             higher: [0, 1, 2].map(|axis| all[..below(1)].iter().map(|&k| plus(k, unit(axis))).collect()),
             lower: [0, 1, 2].map(|axis| {
@@ -71,8 +70,14 @@ impl Indices {
     }
 }
 
+/// Where k stands: behind all of lower degree, and behind those of its degree whose first exponent, or else whose second one, is higher.
+fn find([a, b, c]: [usize; 3]) -> usize {
+    let (degree, rest) = (a + b + c, b + c);
+    degree * (degree + 1) * (degree + 2) / 6 + rest * (rest + 1) / 2 + c
+}
+
 /// How k follows from lower exponents, along the first axis along which it can.
-fn step(k: [usize; 3], find: impl Fn([usize; 3]) -> usize) -> Step {
+fn step(k: [usize; 3]) -> Step {
     let axis = (0..3).find(|&axis| k[axis] > 0).unwrap_or(0);
     let less = |by: usize| {
         let mut lower = k;

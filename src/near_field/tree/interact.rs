@@ -50,8 +50,8 @@ impl Octet {
     }
 }
 
-/// The highest order of an expansion.
-pub(super) const MAX_ORDER: usize = 14;
+/// The highest order of an expansion: what a million grains want at a tolerance of 1e-8.
+pub(super) const MAX_ORDER: usize = 18;
 
 /// g_m = (1/r d/dr)^m of the potential, for eight distances.
 ///

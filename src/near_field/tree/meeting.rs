@@ -103,7 +103,7 @@ impl<'a> Meeting<'a> {
             self.sum_pairs(one, other);
             return;
         }
-        if let Some(order) = self.acceptance.order(self.setup.law, first, second) {
+        if let Some(order) = self.acceptance.order(self.setup.law, self.setup.highest_order(), first, second) {
             if pairs <= self.setup.worth[order] {
                 self.sum_pairs(one, other);
             } else {
