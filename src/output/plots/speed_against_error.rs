@@ -14,7 +14,8 @@ use crate::study::compare::{Comparison, Curve, Regime};
 const SIZE: [i32; 2] = [900, 560];
 /// Where the key begins, right of the curves, pixels.
 const KEY: i32 = 640;
-const COLOURS: [RGBColor; 6] = [BLUE, ORANGE, GREEN, PURPLE, SKY, MUTED];
+const COLOURS: [RGBColor; 8] =
+    [BLUE, ORANGE, GREEN, PURPLE, SKY, MUTED, RGBColor(0xe6, 0x9f, 0x00), RGBColor(0x99, 0x99, 0x33)];
 /// Room left around the points, a factor.
 const MARGIN: f64 = 2.0;
 
