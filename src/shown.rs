@@ -52,6 +52,17 @@ impl Picture {
     }
 }
 
+impl Picture {
+    /// What stands over it.
+    #[must_use]
+    pub fn title(&self) -> &str {
+        match self {
+            Self::Chart(chart) => &chart.title,
+            Self::Map(map) => &map.title,
+        }
+    }
+}
+
 /// How numbers are laid out along an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {

@@ -56,6 +56,8 @@ fn every_quick_study_leaves_numbers_pictures_and_a_verdict() {
     let mut expected: Vec<&str> = STUDIES.iter().map(|study| study.name).collect();
     expected.sort_unstable();
     assert_eq!(names(&target), expected, "and nothing else is left");
+    assert_eq!(names(home.path()), ["studies", "studies.md"]);
+    let page = fs::read_to_string(home.path().join("studies.md")).expect("it is there");
     for study in STUDIES {
         let folder = target.join(study.name);
         assert_eq!(names(&folder), ["pictures", "summary.json", "tables", "verdict.md"]);
@@ -75,7 +77,9 @@ fn every_quick_study_leaves_numbers_pictures_and_a_verdict() {
             assert!(rows.len() > 3, "{name}");
             assert!(rows.iter().flatten().all(|cell| cell != "NaN"), "{name}");
         }
+        assert!(page.contains(study.statement), "{}", study.name);
         for name in names(&folder.join("pictures")) {
+            assert!(page.contains(&format!("](studies/{}/pictures/{name})", study.name)), "{name}");
             let svg = fs::read_to_string(folder.join("pictures").join(&name)).expect("it is there");
             assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>") && !svg.contains("NaN"), "{name}");
         }

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
-use impinge::output::{Folder, Reproduction};
+use impinge::output::{Folder, Overview, Reproduction};
 use impinge::study::reproduce::{Error, STUDIES, Settings, Study};
 use miette::miette;
 
@@ -22,7 +22,7 @@ pub(super) struct Args {
     /// List the studies.
     #[arg(long, conflicts_with = "name")]
     list: bool,
-    /// Folder for the results; with `all` a folder of their folders [default: the name, in the current folder].
+    /// Folder for the results; with `all` a folder of their folders, and a page on all of them beside it [default: the name, in the current folder].
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Fewer and smaller runs: seconds instead of minutes, with larger uncertainties.
@@ -40,6 +40,8 @@ pub(super) struct Args {
 pub(super) fn reproduce(args: &Args) -> Result<Ending, Failure> {
     let Some(name) = &args.name else { return list() };
     let target = args.output.clone().unwrap_or_else(|| PathBuf::from(name));
+    let overview = || Overview::begin(&target, args.force).map_err(|error| Failure::Input(report(&error)));
+    let mut overview = if name == ALL { Some(overview()?) } else { None };
     let studies: Vec<(&Study, PathBuf)> = match Study::named(name) {
         Some(study) => vec![(study, target)],
         None if name == ALL => STUDIES.iter().map(|&study| (study, target.join(study.name))).collect(),
@@ -68,6 +70,12 @@ pub(super) fn reproduce(args: &Args) -> Result<Ending, Failure> {
         let verdict = Reproduction::new(study, args.quick, args.seed, &found);
         let written = verdict.write(&found, folder).map_err(|error| Failure::Run(report(&error)))?;
         print(&format!("{verdict}written to {}\n\n", written.display()))?;
+        if let Some(overview) = &mut overview {
+            overview.add(verdict, &found).map_err(|error| Failure::Run(report(&error)))?;
+        }
+    }
+    if let Some(overview) = overview {
+        print(&format!("all of them: {}\n", overview.page().display()))?;
     }
     Ok(Ending::Done)
 }

@@ -17,6 +17,6 @@ pub use comparison::{comparison_text, write_comparison};
 pub use error::Error;
 pub use folder::Folder;
 pub use recorder::{Outcome, Recorder};
-pub use reproduction::Reproduction;
+pub use reproduction::{Overview, Reproduction};
 pub use summary::Summary;
 pub use tables::EventTable;

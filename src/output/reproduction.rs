@@ -1,12 +1,14 @@
 //! What a study found, as files: a verdict to read, the same for programs, tables and pictures.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
 use super::tables::table;
 use super::{Error, Folder, plots};
+use crate::shown::Picture;
 use crate::study::reproduce::{Finding, Report, Study, Verdict};
 
 /// The verdict of a study: on the terminal, in `verdict.md` and in `summary.json`.
@@ -86,4 +88,90 @@ impl fmt::Display for Reproduction {
         let extent = if self.quick { "quick" } else { "full" };
         writeln!(f, "\nVerdict: **{}** ({extent} study, seed {}, impinge {})", self.verdict, self.seed, self.version)
     }
+}
+
+/// All studies of one command on one page, beside the folder of their folders.
+#[derive(Debug)]
+pub struct Overview {
+    page: PathBuf,
+    /// The folder of their folders, as the page calls it.
+    folder: String,
+    /// What each study found, and file and title of its pictures.
+    studies: Vec<(Reproduction, Vec<[String; 2]>)>,
+}
+
+impl Overview {
+    /// The page `target.md` of studies whose folders will be in `target`.
+    ///
+    /// # Errors
+    /// [`Error::Occupied`] if there is such a page and no `force`.
+    pub fn begin(target: &Path, force: bool) -> Result<Self, Error> {
+        let mut page = target.as_os_str().to_owned();
+        page.push(".md");
+        let page = PathBuf::from(page);
+        if page.exists() && !force {
+            return Err(Error::Occupied { folder: page });
+        }
+        let folder = target.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        Ok(Self { page, folder, studies: Vec::new() })
+    }
+
+    /// Adds a study whose results are written, and writes the page anew, so that it is there even if a later study is broken off.
+    ///
+    /// # Errors
+    /// [`Error::Write`].
+    pub fn add(&mut self, study: Reproduction, report: &Report) -> Result<(), Error> {
+        let picture = |picture: &Picture| [format!("{}.svg", picture.name()), picture.title().to_owned()];
+        self.studies.push((study, report.pictures.iter().map(picture).collect()));
+        let failed = |source| Error::Write { path: self.page.clone(), source };
+        let beside = self.page.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let mut file = tempfile::NamedTempFile::new_in(beside).map_err(failed)?;
+        file.write_all(self.to_string().as_bytes()).map_err(failed)?;
+        file.persist(&self.page).map_err(|error| failed(error.error))?;
+        Ok(())
+    }
+
+    /// Where the page is.
+    #[must_use]
+    pub fn page(&self) -> &Path {
+        &self.page
+    }
+}
+
+impl fmt::Display for Overview {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Some((first, _)) = self.studies.first() else { return Ok(()) };
+        let quick = if first.quick { " --quick" } else { "" };
+        writeln!(f, "# What papers state, put to the test\n")?;
+        writeln!(f, "Written by `impinge reproduce all{quick} --seed {}`, Impinge {}.\n", first.seed, first.version)?;
+        writeln!(f, "| study | what it is about | agrees | differs | undecided |\n|---|---|---|---|---|")?;
+        for (study, _) in &self.studies {
+            let count = |verdict| study.findings.iter().filter(|finding| finding.verdict == verdict).count();
+            let [agrees, differs, undecided] = [Verdict::Agrees, Verdict::Differs, Verdict::Undecided].map(count);
+            let (name, title) = (study.study, cell(study.title));
+            writeln!(f, "| [{name}](#{}) | {title} | {agrees} | {differs} | {undecided} |", anchor(name))?;
+        }
+        for (study, pictures) in &self.studies {
+            writeln!(f, "\n<a id=\"{}\"></a>\n\n## {}: {}\n", anchor(study.study), study.study, study.title)?;
+            writeln!(f, "{}: {}\n", study.source, study.statement)?;
+            writeln!(f, "| claim | measured | verdict |\n|---|---|---|")?;
+            for Finding { claim, measured, verdict } in &study.findings {
+                writeln!(f, "| {} | {} | {verdict} |", cell(claim), cell(measured))?;
+            }
+            for [file, title] in pictures {
+                writeln!(f, "\n![{title}]({}/{}/pictures/{file})", self.folder, study.study)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A text that may stand in a cell of a table.
+fn cell(text: &str) -> String {
+    text.replace('|', "\\|").replace('\n', " ")
+}
+
+/// What links to a study call it.
+fn anchor(name: &str) -> String {
+    format!("study-{name}")
 }
