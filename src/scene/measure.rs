@@ -64,7 +64,7 @@ pub struct SurfaceEnergyMeasure {
     pub batches: u32,
 }
 
-/// `kind = "subsurface"`: the first plane of the scene, which must be at rest, bounds an elastic solid; each hit is a force on a point of it.
+/// `kind = "subsurface"`: the first plane at rest bounds an elastic solid; each hit is a force on a point of it.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct SubsurfaceMeasure {
@@ -206,10 +206,13 @@ impl Scene {
 }
 
 impl Scene {
-    /// The first plane that grains hit.
+    /// The first plane that does not move.
     #[must_use]
-    pub fn first_plane(&self) -> Option<&PlaneSurface> {
-        self.surface.iter().find_map(|surface| if let Surface::Plane(plane) = surface { Some(plane) } else { None })
+    pub fn plane_at_rest(&self) -> Option<&PlaneSurface> {
+        self.surface.iter().find_map(|surface| match surface {
+            Surface::Plane(plane) if plane.velocity == [0.0; 3] => Some(plane),
+            _ => None,
+        })
     }
 }
 
@@ -284,21 +287,16 @@ fn check_grid(
 }
 
 fn check_subsurface(key: &impl Fn(&str) -> String, measure: &SubsurfaceMeasure, scene: &Scene) -> Checked {
-    let Some(plane) = scene.first_plane() else {
-        let remedy = "add a [[surface]] with `kind = \"plane\"`, or take the measurement out";
-        return Err(Invalid::new(key("kind"), "there is no plane that bounds a solid", remedy));
+    let Some(plane) = scene.plane_at_rest() else {
+        let remedy = "add a [[surface]] with `kind = \"plane\"` and no velocity, or take the measurement out";
+        return Err(Invalid::new(key("kind"), "there is no plane at rest that bounds a solid", remedy));
     };
-    if plane.velocity != [0.0; 3] {
-        let what = format!("the plane moves at {:?} m/s, and the solid below it does not", plane.velocity);
-        return Err(Invalid::new(key("kind"), what, "give the first plane no `velocity`"));
-    }
     check_grid(key, Some(measure.min), Some(measure.max), measure.cells, measure.batches, scene)?;
     let corners = (0..8).map(|corner| -> Vec3 {
         std::array::from_fn(|axis| if corner >> axis & 1 == 0 { measure.min[axis] } else { measure.max[axis] })
     });
     let length = plane.normal.iter().map(|part| part * part).sum::<f64>().sqrt();
-    let height =
-        |corner: Vec3| (0..3).map(|i| (corner[i] - plane.point[i]) * plane.normal[i]).sum::<f64>() / length;
+    let height = |corner: Vec3| (0..3).map(|i| (corner[i] - plane.point[i]) * plane.normal[i]).sum::<f64>() / length;
     let highest = corners.map(height).fold(f64::NEG_INFINITY, f64::max);
     let size = (0..3).map(|axis| measure.max[axis] - measure.min[axis]).fold(0.0, f64::max);
     if highest > ROUNDING * size {
@@ -328,7 +326,11 @@ fn check_subsurface(key: &impl Fn(&str) -> String, measure: &SubsurfaceMeasure, 
         positive(&key("contact_time"), time, "s")?;
         if measure.grain_young_modulus.is_some() {
             let what = format!("contacts last {time} s, however stiff the grains are");
-            return Err(Invalid::new(key("grain_young_modulus"), what, "take it out, or set `contact_time = \"hertz\"`"));
+            return Err(Invalid::new(
+                key("grain_young_modulus"),
+                what,
+                "take it out, or set `contact_time = \"hertz\"`",
+            ));
         }
     }
     check_grain_stiffness(key, measure)

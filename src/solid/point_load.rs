@@ -128,18 +128,13 @@ mod tests {
             let (r, rho) = (x.hypot(y), place.norm());
             let rr = load / (2.0 * PI)
                 * ((1.0 - 2.0 * nu) * (1.0 / r.powi(2) - z / (rho * r.powi(2))) - 3.0 * z * r * r / rho.powi(5));
-            let round = -load / (2.0 * PI)
-                * (1.0 - 2.0 * nu)
-                * (1.0 / r.powi(2) - z / (rho * r.powi(2)) - z / rho.powi(3));
+            let round =
+                -load / (2.0 * PI) * (1.0 - 2.0 * nu) * (1.0 / r.powi(2) - z / (rho * r.powi(2)) - z / rho.powi(3));
             let zz = -3.0 * load / (2.0 * PI) * z.powi(3) / rho.powi(5);
             let rz = -3.0 * load / (2.0 * PI) * r * z * z / rho.powi(5);
             let (c, s) = (x / r, y / r);
             let xy = (rr - round) * c * s;
-            [
-                [rr * c * c + round * s * s, xy, rz * c],
-                [xy, rr * s * s + round * c * c, rz * s],
-                [rz * c, rz * s, zz],
-            ]
+            [[rr * c * c + round * s * s, xy, rz * c], [xy, rr * s * s + round * c * c, rz * s], [rz * c, rz * s, zz]]
         };
         let along_x = |load: f64, [x, y, z]: [f64; 3]| {
             let rho = place.norm();
@@ -153,8 +148,7 @@ mod tests {
                 * (-3.0 * x * y * y / r5
                     + k * (x / r3 - x / (rho * q2) + x * y * y / (r3 * q2) + 2.0 * x * y * y / (r2 * q3)));
             let xy = f
-                * (-3.0 * x * x * y / r5
-                    + k * (-y / (rho * q2) + x * x * y / (r3 * q2) + 2.0 * x * x * y / (r2 * q3)));
+                * (-3.0 * x * x * y / r5 + k * (-y / (rho * q2) + x * x * y / (r3 * q2) + 2.0 * x * x * y / (r2 * q3)));
             let (zz, yz, zx) = (-3.0 * f * x * z * z / r5, -3.0 * f * x * y * z / r5, -3.0 * f * x * x * z / r5);
             [[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]]
         };

@@ -117,7 +117,8 @@ impl Measurement for EnergyInTime {
 
 impl EnergyInTime {
     fn history(&self) -> Table {
-        let columns = &["from", "until", "hits", "energy", "normal", "tangential", "spin", "first_hits", "repeated_hits"];
+        let columns =
+            &["from", "until", "hits", "energy", "normal", "tangential", "spin", "first_hits", "repeated_hits"];
         let mut table = Table::new("history", columns);
         for (index, batch) in self.batches.iter().enumerate() {
             let hits: u64 = batch.by_order().iter().map(|tally| tally.hits).sum();
@@ -227,7 +228,8 @@ mod tests {
         let sum = |of: fn(&SurfaceEnergy) -> f64| in_time.batches.iter().map(of).sum::<f64>();
         approx::assert_relative_eq!(sum(SurfaceEnergy::all_hits), all.all_hits(), max_relative = 1e-13);
         approx::assert_relative_eq!(sum(SurfaceEnergy::first_hits), all.first_hits(), max_relative = 1e-13);
-        let [normal, tangential, spin] = [0, 1, 2].map(|part| in_time.batches.iter().map(|b| parts(b)[part]).sum::<f64>());
+        let [normal, tangential, spin] =
+            [0, 1, 2].map(|part| in_time.batches.iter().map(|b| parts(b)[part]).sum::<f64>());
         approx::assert_relative_eq!(normal + tangential + spin, all.all_hits(), max_relative = 1e-13);
         let power = in_time.power(SurfaceEnergy::all_hits);
         approx::assert_relative_eq!(power.value * FakeJet::UNTIL, all.all_hits(), max_relative = 1e-12);
@@ -247,7 +249,8 @@ mod tests {
     #[test]
     fn the_interference_parameter_is_what_is_left_less_e_squared() {
         let (in_time, _) = watched(WINDOW, 1.0);
-        let left = (in_time.ledger.inside().energy() + in_time.ledger.left().energy()) / in_time.ledger.energy_brought_in();
+        let left =
+            (in_time.ledger.inside().energy() + in_time.ledger.left().energy()) / in_time.ledger.energy_brought_in();
         assert_eq!(in_time.alpha(), Some(left - 0.8 * 0.8));
         assert!(EnergyInTime { restitution: None, ..in_time }.alpha().is_none());
         // Grains that nothing disturbs keep e² of their energy.
