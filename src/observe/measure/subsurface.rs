@@ -240,7 +240,7 @@ impl Observer for Subsurface {
         let from_point = hit.position - self.below.point;
         let on_plane = from_point.dot(&self.below.normal).abs() <= hit.radius;
         let duration = self.below.contact.duration(hit);
-        if !on_plane || (hit.normal - self.below.normal).amax() > ALIGNED || !(duration > 0.0) {
+        if !on_plane || (hit.normal - self.below.normal).amax() > ALIGNED || duration.is_nan() || duration <= 0.0 {
             return;
         }
         let along = |vector: &Vector3<f64>| [self.axes[0].dot(vector), self.axes[1].dot(vector)];
@@ -337,8 +337,8 @@ impl Subsurface {
             let shows = span.clone();
             let (legend, grey) = (legend.to_owned(), "none".to_owned());
             let x = along(0, x.clone());
-            (most > 0.0)
-                .then(|| Picture::Map(Map { name, title, shows, x, y, columns, legend, most, grey, line: None }))
+            let map = Map { name, title, shows, x, y, columns, legend, most, grey, line: None };
+            (most > 0.0).then_some(Picture::Map(map))
         };
         let damage = |cell: &DamageCell| cell.until(self.window.batches - 1) as f64;
         let place = format!("{:.4} m", middle(1, section));

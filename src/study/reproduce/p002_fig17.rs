@@ -91,11 +91,28 @@ fn test(series: &[Arrived], report: &mut Report) {
         format!("{}; of it along the surface and in rotation {}", told(&all_energy), told(&along)),
         peak_inside(&all_energy),
     );
+    let weights = (0..=200).map(|percent| f64::from(percent) / 100.0);
+    let inside = weights.filter(|weight| {
+        let sums: Vec<f64> = normal.iter().zip(&along).map(|(n, t)| n.value + weight * t.value).collect();
+        let ends = sums[0].max(sums[sums.len() - 1]);
+        sums.iter().any(|&sum| sum > ends)
+    });
+    let inside: Vec<f64> = inside.collect();
+    report.measured(
+        format!("{name}: weights w, from 0 to 2, for which normal energy plus w times the rest is greatest between 15 and 60°"),
+        match inside.as_slice() {
+            [] => "none".to_owned(),
+            [only] => format!("{only}"),
+            [first, .., last] => format!("from {first} to {last}"),
+        },
+    );
     let square = |angle: f64| angle.to_radians().cos().powi(2);
     let ratios: Vec<Estimate> = over_normal_incidence(series, normal_of);
     let relative = ratios.iter().zip(ANGLES).map(|(ratio, angle)| *ratio * square(angle).recip()).collect::<Vec<_>>();
     report.measured(
-        format!("{name}: normal energy over all energy at normal incidence, over cos² of the angle (1 for grains that never meet)"),
+        format!(
+            "{name}: normal energy over all energy at normal incidence, over cos² of the angle (1 for grains that never meet)"
+        ),
         told(&relative),
     );
 }

@@ -37,6 +37,11 @@ const LOOSE: f64 = 1.0;
 /// A jet spreads "so" if its spread is more than this part of that of the jet of 10 000.
 const SO: f64 = 0.5;
 
+/// A grain flies in a sheet along the surface if its velocity is off it by no more than this, degrees.
+const SHEET: f64 = 10.0;
+/// A sheet is what most grains are in.
+const MOST: f64 = 0.5;
+
 /// Names of pictures, by frame: few grains, many grains.
 const NAMES: [[&str; 3]; 2] = [["few_20ms", "few_30ms", "few_50ms"], ["many_20ms", "many_30ms", "many_50ms"]];
 
@@ -47,6 +52,8 @@ struct Spread {
     distance: f64,
     /// Median angle of their velocities from the normal, degrees.
     angle: f64,
+    /// Part of them that fly within [`SHEET`] of the surface.
+    sheet: f64,
     /// Part of the grains that no longer fly as they started.
     met: f64,
 }
@@ -64,6 +71,7 @@ fn spread(seen: &[Seen]) -> Spread {
     Spread {
         distance: (squares / met.len() as f64).sqrt(),
         angle: angles[angles.len() / 2],
+        sheet: angles.iter().filter(|angle| (*angle - 90.0).abs() <= SHEET).count() as f64 / met.len() as f64,
         met: met.len() as f64 / seen.len() as f64,
     }
 }
@@ -202,6 +210,13 @@ fn test_spread(seen: &[Seens], report: &mut Report) {
         format!("in m: {}", seen.iter().map(name).collect::<Vec<_>>().join(", ")),
         is_below(narrow, wide * SO),
     );
+    let [dense, thin] = [many, few].map(|at| at.mean(|spread| spread.sheet));
+    judge(
+        report,
+        format!("{MANY} grains form a sheet along the surface, {FEW} do not (most of them fly within {SHEET}° of it)"),
+        format!("part that does: {dense} of {MANY}, {thin} of {FEW}"),
+        all([is_below(Estimate::exact(MOST), dense), is_below(thin, Estimate::exact(MOST))]),
+    );
     let angles = |at: &Seens| format!("{}° with {}", at.mean(|spread| spread.angle), at.jet.grains);
     judge(
         report,
@@ -224,6 +239,8 @@ fn table(seen: &[Seens]) -> Table {
             "distance_error",
             "angle",
             "angle_error",
+            "sheet",
+            "sheet_error",
             "met",
         ],
     );
@@ -234,7 +251,8 @@ fn table(seen: &[Seens]) -> Table {
         (at, gap)
     });
     for (at, gap) in all_frames {
-        let [distance, angle, met] = [at.mean(|s| s.distance), at.mean(|s| s.angle), at.mean(|s| s.met)];
+        let [distance, angle] = [at.mean(|s| s.distance), at.mean(|s| s.angle)];
+        let [sheet, met] = [at.mean(|s| s.sheet), at.mean(|s| s.met)];
         table.row(&[
             &at.jet.grains,
             &at.copies.len(),
@@ -245,6 +263,8 @@ fn table(seen: &[Seens]) -> Table {
             &distance.error,
             &angle.value,
             &angle.error,
+            &sheet.value,
+            &sheet.error,
             &met.value,
         ]);
     }
@@ -304,7 +324,7 @@ mod tests {
         ];
         let spread = spread(&seen);
         approx::assert_relative_eq!(spread.distance, (50.0_f64 / 3.0).sqrt(), max_relative = 1e-14);
-        assert_eq!((spread.angle.round(), spread.met), (45.0, 0.75));
+        assert_eq!((spread.angle.round(), spread.sheet, spread.met), (45.0, 1.0 / 3.0, 0.75));
         // Nearest neighbours: 4, 4 (or more), sqrt(11), 4.
         let distance = |a: usize, b: usize| (seen[a].place - seen[b].place).norm();
         let nearest = (0..4).map(|a| (0..4).filter(|&b| b != a).map(|b| distance(a, b)).fold(f64::INFINITY, f64::min));
