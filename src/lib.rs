@@ -30,6 +30,7 @@ pub mod scene;
 pub mod scheme;
 pub mod shown;
 pub mod simulation;
+pub mod solid;
 pub mod source;
 pub mod study;
 mod sum;

@@ -50,6 +50,8 @@ impl FakeJet {
         SurfaceHit {
             time: 0.0,
             id: 0,
+            mass: 1.0,
+            radius: RADIUS,
             element: 0,
             position: Vector3::zeros(),
             normal: Vector3::z(),
@@ -142,6 +144,7 @@ impl<O: Observer> State<'_, O> {
         self.observer.surface_hit(&SurfaceHit {
             time: self.time,
             id: grain.id,
+            mass: grain.mass,
             position: flight.position - Vector3::z() * RADIUS,
             impulse_normal: impulse.z,
             impulse_tangential: Vector3::new(impulse.x, impulse.y, 0.0),

@@ -3,11 +3,14 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::limits::Checked;
-use super::{Invalid, Run, Scene, Vec3};
+use super::limits::{Checked, positive};
+use super::{Invalid, PlaneSurface, Run, Scene, Surface, Vec3};
 
 /// Most cells of a grid times batches: each holds a dozen numbers, so that these fill 2 GB. More is a misplaced digit.
 const CELLS_MAX: u64 = 20_000_000;
+
+/// So much of its size may rounding put a grid above the plane that it reaches up to.
+const ROUNDING: f64 = 1e-12;
 
 /// `[[measure]]`: something to be measured; its results go into `measures/NAME`.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema, PartialEq)]
@@ -15,6 +18,10 @@ const CELLS_MAX: u64 = 20_000_000;
 pub enum Measure {
     /// Density, velocity and granular temperature on a grid, averaged over time.
     Flow(FlowMeasure),
+    /// Energy that grains bring to the surface, over time and by hit order.
+    SurfaceEnergy(SurfaceEnergyMeasure),
+    /// Stress and damage that every hit on a plane makes in the solid below it.
+    Subsurface(SubsurfaceMeasure),
 }
 
 /// `kind = "flow"`
@@ -42,6 +49,107 @@ fn default_batches() -> u32 {
     10
 }
 
+/// `kind = "surface-energy"`
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct SurfaceEnergyMeasure {
+    /// Name of its folder; left out, its kind.
+    pub name: Option<String>,
+    /// When it begins, s; left out, at the start of the run.
+    pub from: Option<f64>,
+    /// When it ends, s; left out, at the end of the run.
+    pub until: Option<f64>,
+    /// Batches: the steps of the history in time, whose scatter tells how sure the mean power is.
+    #[serde(default = "default_batches")]
+    pub batches: u32,
+}
+
+/// `kind = "subsurface"`: the first plane at rest bounds an elastic solid; each hit is a force on a point of it.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct SubsurfaceMeasure {
+    /// Name of its folder; left out, its kind.
+    pub name: Option<String>,
+    /// Lower corner of the grid, m; all of it must be below the plane.
+    pub min: Vec3,
+    /// Upper corner of the grid, m.
+    pub max: Vec3,
+    /// Cells along x, y and z; the stress is that in the middle of a cell.
+    pub cells: [u32; 3],
+    /// Young's modulus of the solid without pores, Pa.
+    pub young_modulus: f64,
+    /// Poisson's ratio of the solid without pores, above -1 and below 1/2.
+    #[serde(default = "default_poisson_ratio")]
+    pub poisson_ratio: f64,
+    /// Part of the volume that is pores, 0 to below 1.
+    #[serde(default)]
+    pub porosity: f64,
+    /// phi: weight of the upper bound of Hashin & Shtrikman in the moduli of the porous solid, 0 to 1; the rest is that of the lower one.
+    #[serde(default = "one")]
+    pub bound: f64,
+    /// C: moduli of the pores over those of the solid; above 0, below 1.
+    #[serde(default = "default_pore_stiffness")]
+    pub pore_stiffness: f64,
+    /// sigma_0: equivalent stress above which there is damage, Pa.
+    pub threshold: f64,
+    /// How long a contact lasts, which makes a force of an impulse: seconds, or "hertz" for that of an elastic contact of the grain with the porous
+    /// solid.
+    #[serde(default)]
+    pub contact_time: ContactTime,
+    /// With `contact_time = "hertz"`: Young's modulus of the grains, Pa; left out, they are rigid.
+    pub grain_young_modulus: Option<f64>,
+    /// With `grain_young_modulus`: Poisson's ratio of the grains, above -1 and at most 1/2; 0.3 where left out.
+    pub grain_poisson_ratio: Option<f64>,
+    /// When it begins, s; left out, at the start of the run.
+    pub from: Option<f64>,
+    /// When it ends, s; left out, at the end of the run.
+    pub until: Option<f64>,
+    /// Batches that tell how damage grows, and how sure it is where hits come evenly.
+    #[serde(default = "default_batches")]
+    pub batches: u32,
+}
+
+impl SubsurfaceMeasure {
+    /// Poisson's ratio of solids and grains where the scene gives none: that of steel.
+    pub const POISSON_RATIO: f64 = 0.3;
+}
+
+fn default_poisson_ratio() -> f64 {
+    SubsurfaceMeasure::POISSON_RATIO
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn default_pore_stiffness() -> f64 {
+    1e-4
+}
+
+/// How long a contact lasts.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema, PartialEq)]
+#[serde(untagged)]
+pub enum ContactTime {
+    /// Always the same, s.
+    Fixed(f64),
+    /// As long as its grain and its speed make it.
+    Elastic(Elastic),
+}
+
+impl Default for ContactTime {
+    fn default() -> Self {
+        Self::Elastic(Elastic::Hertz)
+    }
+}
+
+/// A model of a contact.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+pub enum Elastic {
+    /// Hertz (1882).
+    Hertz,
+}
+
 /// When something is measured, and in how many batches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Span {
@@ -65,12 +173,16 @@ impl Measure {
     fn name(&self) -> Option<&str> {
         match self {
             Self::Flow(flow) => flow.name.as_deref(),
+            Self::SurfaceEnergy(energy) => energy.name.as_deref(),
+            Self::Subsurface(subsurface) => subsurface.name.as_deref(),
         }
     }
 
     fn kind(&self) -> &'static str {
         match self {
             Self::Flow(_) => "flow",
+            Self::SurfaceEnergy(_) => "surface-energy",
+            Self::Subsurface(_) => "subsurface",
         }
     }
 
@@ -79,6 +191,8 @@ impl Measure {
     pub fn span(&self) -> Span {
         match *self {
             Self::Flow(FlowMeasure { from, until, batches, .. }) => Span { from, until, batches },
+            Self::SurfaceEnergy(SurfaceEnergyMeasure { from, until, batches, .. }) => Span { from, until, batches },
+            Self::Subsurface(SubsurfaceMeasure { from, until, batches, .. }) => Span { from, until, batches },
         }
     }
 }
@@ -88,6 +202,17 @@ impl Scene {
     #[must_use]
     pub fn measure_names(&self) -> Vec<String> {
         self.measure.iter().map(|measure| measure.name().unwrap_or(measure.kind()).to_owned()).collect()
+    }
+}
+
+impl Scene {
+    /// The first plane that does not move.
+    #[must_use]
+    pub fn plane_at_rest(&self) -> Option<&PlaneSurface> {
+        self.surface.iter().find_map(|surface| match surface {
+            Surface::Plane(plane) if plane.velocity == [0.0; 3] => Some(plane),
+            _ => None,
+        })
     }
 }
 
@@ -107,6 +232,8 @@ pub(super) fn check(scene: &Scene) -> Checked {
         check_span(&key, measure.span(), &scene.run)?;
         match measure {
             Measure::Flow(flow) => check_grid(&key, flow.min, flow.max, flow.cells, flow.batches, scene)?,
+            Measure::SurfaceEnergy(_) => {}
+            Measure::Subsurface(subsurface) => check_subsurface(&key, subsurface, scene)?,
         }
     }
     Ok(())
@@ -155,6 +282,72 @@ fn check_grid(
     if count > CELLS_MAX {
         let what = format!("{count} cells, counted for each batch, are more than fit into memory");
         return Err(Invalid::new(key("cells"), what, format!("use at most {CELLS_MAX}")));
+    }
+    Ok(())
+}
+
+fn check_subsurface(key: &impl Fn(&str) -> String, measure: &SubsurfaceMeasure, scene: &Scene) -> Checked {
+    let Some(plane) = scene.plane_at_rest() else {
+        let remedy = "add a [[surface]] with `kind = \"plane\"` and no velocity, or take the measurement out";
+        return Err(Invalid::new(key("kind"), "there is no plane at rest that bounds a solid", remedy));
+    };
+    check_grid(key, Some(measure.min), Some(measure.max), measure.cells, measure.batches, scene)?;
+    let corners = (0..8).map(|corner| -> Vec3 {
+        std::array::from_fn(|axis| if corner >> axis & 1 == 0 { measure.min[axis] } else { measure.max[axis] })
+    });
+    let length = plane.normal.iter().map(|part| part * part).sum::<f64>().sqrt();
+    let height = |corner: Vec3| (0..3).map(|i| (corner[i] - plane.point[i]) * plane.normal[i]).sum::<f64>() / length;
+    let highest = corners.map(height).fold(f64::NEG_INFINITY, f64::max);
+    let size = (0..3).map(|axis| measure.max[axis] - measure.min[axis]).fold(0.0, f64::max);
+    if highest > ROUNDING * size {
+        let what = format!("the grid reaches {highest} m above the plane, where there is no solid");
+        return Err(Invalid::new(key("max"), what, "move the grid down, or make it smaller"));
+    }
+    positive(&key("young_modulus"), measure.young_modulus, "Pa")?;
+    positive(&key("threshold"), measure.threshold, "Pa")?;
+    let nu = measure.poisson_ratio;
+    if !(nu > -1.0 && nu < 0.5) {
+        let what = format!("{nu} is outside (-1, 0.5), where a solid has a bulk modulus");
+        return Err(Invalid::new(key("poisson_ratio"), what, "0.3 is that of steel"));
+    }
+    if !(0.0..1.0).contains(&measure.porosity) {
+        let what = format!("{} is outside [0, 1)", measure.porosity);
+        return Err(Invalid::new(key("porosity"), what, "give the part of the volume that is pores; 0 for none"));
+    }
+    if !(0.0..=1.0).contains(&measure.bound) {
+        let what = format!("{} is outside [0, 1]", measure.bound);
+        return Err(Invalid::new(key("bound"), what, "1 is the upper bound, 0 the lower one"));
+    }
+    if !(measure.pore_stiffness > 0.0 && measure.pore_stiffness < 1.0) {
+        let what = format!("{} is outside (0, 1)", measure.pore_stiffness);
+        return Err(Invalid::new(key("pore_stiffness"), what, "1e-4 is so soft that less changes nothing"));
+    }
+    if let ContactTime::Fixed(time) = measure.contact_time {
+        positive(&key("contact_time"), time, "s")?;
+        if measure.grain_young_modulus.is_some() {
+            let what = format!("contacts last {time} s, however stiff the grains are");
+            return Err(Invalid::new(
+                key("grain_young_modulus"),
+                what,
+                "take it out, or set `contact_time = \"hertz\"`",
+            ));
+        }
+    }
+    check_grain_stiffness(key, measure)
+}
+
+fn check_grain_stiffness(key: &impl Fn(&str) -> String, measure: &SubsurfaceMeasure) -> Checked {
+    if let Some(young) = measure.grain_young_modulus {
+        positive(&key("grain_young_modulus"), young, "Pa")?;
+    }
+    let Some(nu) = measure.grain_poisson_ratio else { return Ok(()) };
+    if measure.grain_young_modulus.is_none() {
+        let what = format!("{nu} has no effect: the grains are rigid");
+        return Err(Invalid::new(key("grain_poisson_ratio"), what, "take it out, or give `grain_young_modulus`"));
+    }
+    if !(nu > -1.0 && nu <= 0.5) {
+        let what = format!("{nu} is outside (-1, 0.5], where an elastic solid is stable");
+        return Err(Invalid::new(key("grain_poisson_ratio"), what, "0.3 is that of steel"));
     }
     Ok(())
 }

@@ -140,6 +140,10 @@ pub struct SurfaceHit {
     pub time: f64,
     /// Id of the grain.
     pub id: u64,
+    /// Mass of the grain, kg.
+    pub mass: f64,
+    /// Radius of the grain, m.
+    pub radius: f64,
     /// Number of the plane or triangle, counted over all surfaces in the order of the scene.
     pub element: u32,
     /// Contact point, m.

@@ -2,10 +2,14 @@
 
 mod flow;
 mod grid;
+mod subsurface;
+mod surface_energy;
 mod window;
 
 pub use flow::Flow;
 pub use grid::Grid;
+pub use subsurface::{Contact, DamageCell, HalfSpace, Subsurface};
+pub use surface_energy::{EnergyInTime, interference_parameter};
 pub use window::Window;
 
 use crate::scene::{Measure, Scene};
@@ -44,6 +48,8 @@ pub fn measurements(scene: &Scene) -> Vec<(String, Box<dyn Measurement>)> {
     let of = |measure: &Measure| -> Box<dyn Measurement> {
         match measure {
             Measure::Flow(flow) => Box::new(Flow::new(flow, scene)),
+            Measure::SurfaceEnergy(energy) => Box::new(EnergyInTime::new(energy, scene)),
+            Measure::Subsurface(subsurface) => Box::new(Subsurface::new(subsurface, scene)),
         }
     };
     scene.measure_names().into_iter().zip(scene.measure.iter().map(of)).collect()

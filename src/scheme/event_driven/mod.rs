@@ -431,6 +431,8 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         observer.surface_hit(&SurfaceHit {
             time: self.epoch_start + time,
             id,
+            mass: before.mass,
+            radius: before.radius,
             element,
             position: flight.position - contact.normal * (before.radius + contact.gap),
             normal: contact.normal,

@@ -285,6 +285,8 @@ impl Contact {
         let hit = SurfaceHit {
             time,
             id: crowd.grains[self.slot as usize].id,
+            mass: crowd.grains[self.slot as usize].mass,
+            radius: crowd.flights[self.slot as usize].radius,
             element: self.touch.element,
             position: self.touch.position,
             normal,

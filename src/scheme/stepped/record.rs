@@ -49,6 +49,8 @@ impl Crowd {
         let hit = SurfaceHit {
             time: self.time() + after,
             id: self.grains[slot as usize].id,
+            mass: before.mass,
+            radius: before.radius,
             element,
             position: self.flights[slot as usize].position - contact.normal * (before.radius + contact.gap),
             normal: contact.normal,

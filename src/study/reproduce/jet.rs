@@ -2,11 +2,14 @@
 
 use std::f64::consts::PI;
 
+use nalgebra::Vector3;
+
 use super::{Error, Settings, run_all};
 use crate::estimate::Estimate;
 use crate::grains::sphere_volume;
 use crate::observe::{Ledger, SurfaceEnergy};
 use crate::scene::{Interference, Scene};
+use crate::scheme::Observer;
 
 /// Grains of radius 0.01 m and density 8500 kg/m³ in a block, all at 80 m/s straight down onto the plane z = 0, without gravity.
 ///
@@ -26,6 +29,10 @@ pub struct Jet {
     pub width: f64,
     /// Length of the box in which centres start, m.
     pub length: f64,
+    /// Angle between the jet and the normal of the plane, degrees: the plane is tilted and rises towards negative x, where the jet arrives first.
+    pub angle: f64,
+    /// End of the run, s.
+    pub until: f64,
     /// Where the grains are.
     pub seed: u64,
 }
@@ -36,12 +43,8 @@ const RADIUS: f64 = 0.01;
 const DENSITY: f64 = 8500.0;
 /// Speed of the grains, m/s.
 const SPEED: f64 = 80.0;
-/// Distance of the lowest centre from the plane, m.
+/// Least distance of the centres from the plane, m.
 const GAP: f64 = 0.1;
-/// End of the run, s.
-const UNTIL: f64 = 0.5;
-/// Half the width of the domain, and its height: what the fastest grain can reach until then, m.
-const REACH: f64 = SPEED * UNTIL;
 
 impl Jet {
     /// The jet of the paper, with 8000 grains of restitution 0.8.
@@ -54,6 +57,8 @@ impl Jet {
             interference: Interference::All,
             width: 0.2,
             length: 2.5,
+            angle: 0.0,
+            until: 0.5,
             seed: 1,
         }
     }
@@ -64,28 +69,34 @@ impl Jet {
     /// If a number is none (NaN).
     #[must_use]
     pub fn scene(&self) -> Scene {
-        let Self { grains, restitution, friction, width, length, seed, .. } = self;
+        let Self { grains, restitution, friction, width, length, until, seed, .. } = self;
         let model = self.model();
-        let (half, top) = (width / 2.0, GAP + length);
+        let (sin, cos) = self.angle.to_radians().sin_cos();
+        let half = width / 2.0;
+        let bottom = GAP + half * sin / cos;
+        let top = bottom + length;
+        // Half the width of the domain, and its height: what the fastest grain can reach until the end.
+        let reach = SPEED * until;
+        let depth = if self.angle == 0.0 { 0.1 } else { reach };
         let text = format!(
             r#"
             seed = {seed}
-            run = {{ until = {UNTIL:?}, interference = "{model}" }}
-            domain = {{ min = [-{REACH:?}, -{REACH:?}, -0.1], max = [{REACH:?}, {REACH:?}, {REACH:?}] }}
+            run = {{ until = {until:?}, interference = "{model}" }}
+            domain = {{ min = [-{reach:?}, -{reach:?}, -{depth:?}], max = [{reach:?}, {reach:?}, {reach:?}] }}
             grain = {{ radius = {RADIUS}, density = {DENSITY:?} }}
             contact.grain = {{ restitution = {restitution:?}, friction = {friction:?} }}
             contact.surface = {{ restitution = {restitution:?}, friction = {friction:?} }}
             output = {{ samples = 2 }}
             [[source]]
             kind = "block"
-            min = [-{half:?}, -{half:?}, {GAP:?}]
+            min = [-{half:?}, -{half:?}, {bottom:?}]
             max = [{half:?}, {half:?}, {top:?}]
             count = {grains}
             velocity = [0.0, 0.0, -{SPEED:?}]
             [[surface]]
             kind = "plane"
             point = [0.0, 0.0, 0.0]
-            normal = [0.0, 0.0, 1.0]
+            normal = [{sin:?}, 0.0, {cos:?}]
             "#
         );
         toml::from_str(&text).expect("the scene is right")
@@ -95,6 +106,18 @@ impl Jet {
     #[must_use]
     pub fn diameter(&self) -> f64 {
         2.0 * RADIUS
+    }
+
+    /// Velocity of its grains, m/s.
+    #[must_use]
+    pub fn velocity(&self) -> Vector3<f64> {
+        Vector3::new(0.0, 0.0, -SPEED)
+    }
+
+    /// How long the block takes to arrive, s.
+    #[must_use]
+    pub fn duration(&self) -> f64 {
+        self.length / SPEED
     }
 
     /// Volume of the grains over that of the box around them.
@@ -208,12 +231,22 @@ pub(super) fn run_copies(
     copies: impl Fn(&Jet) -> u64,
     settings: &Settings<'_>,
 ) -> Result<Vec<Copies>, Error> {
+    let runs = copies_of(jets, copies, settings, Jet::scene, Energies::of)?;
+    Ok(jets.iter().zip(runs).map(|(&jet, energies)| Copies { jet, energies }).collect())
+}
+
+/// The same of scenes that `scene` makes of the jets, with what `measure` makes of the observer of each.
+pub(super) fn copies_of<O: Observer + Default, T: Send>(
+    jets: &[Jet],
+    copies: impl Fn(&Jet) -> u64,
+    settings: &Settings<'_>,
+    scene: impl Fn(&Jet) -> Scene + Sync,
+    measure: impl Fn(O) -> T + Sync,
+) -> Result<Vec<Vec<T>>, Error> {
     let of = |jet: &Jet| (0..copies(jet)).map(|copy| Jet { seed: settings.seed.wrapping_add(copy), ..*jet }).collect();
     let runs: Vec<Vec<Jet>> = jets.iter().map(of).collect();
-    let mut energies = run_all(&runs.concat(), settings, Jet::scene, Energies::of)?.into_iter();
-    let gather =
-        |(jet, runs): (&Jet, &Vec<Jet>)| Copies { jet: *jet, energies: energies.by_ref().take(runs.len()).collect() };
-    Ok(jets.iter().zip(&runs).map(gather).collect())
+    let mut measured = run_all(&runs.concat(), settings, scene, measure)?.into_iter();
+    Ok(runs.iter().map(|runs| measured.by_ref().take(runs.len()).collect()).collect())
 }
 
 #[cfg(test)]
@@ -231,6 +264,19 @@ mod tests {
         // As far as the first rebounding grain gets before the jet ends it meets all others, whatever the restitution.
         let far = jet.length * jet.restitution / (1.0 + jet.restitution);
         approx::assert_relative_eq!(jet.shielding(far) * 499.0 / 500.0, jet.crowding(), max_relative = 1e-14);
+    }
+
+    /// Grains that do not see each other bring cos² of their energy along the normal, whatever is tilted.
+    #[test]
+    fn a_tilted_plane_is_hit_at_the_angle_of_the_jet() {
+        let jet = Jet { grains: 50, angle: 60.0, interference: Interference::None, ..Jet::reference() };
+        assert!(check(&jet.scene()).is_ok());
+        let normal = |(_, energy): (Ledger, SurfaceEnergy)| {
+            (energy.by_order()[0].normal.value() / energy.all_hits(), energy.by_order()[0].hits)
+        };
+        let (part, hits) = run_all(&[jet], &unwatched(true), Jet::scene, normal).expect("it runs")[0];
+        approx::assert_relative_eq!(part, 0.25, max_relative = 1e-12);
+        assert_eq!(hits, 50);
     }
 
     #[test]

@@ -2,15 +2,23 @@
 //!
 //! A study is a file here (named after the paper's number and its figure) and a line in [`STUDIES`]. It gets [`Settings`] and gives a [`Report`]; it reads no file and writes none.
 //! What studies share: [`run_all`] (many runs on all cores, in a fixed order), [`Estimate`](crate::estimate::Estimate) (a mean and how sure it is),
-//! [`shown`](crate::shown) (tables and pictures as data), [`Jet`] (the reference jet) and [`Sequence`] (two grains and a wall, in closed form).
+//! [`shown`](crate::shown) (tables and pictures as data), [`Jet`] (the reference jet), [`trend`] (whether a series falls, beyond its errors) and [`Sequence`] (two grains and a wall, in closed form).
 
+mod arrivals;
 mod ensemble;
 mod first_order_or_repeated;
 mod jet;
+mod p002_fig13;
+mod p002_fig16;
+mod p002_fig17;
 mod p002_fig18;
 mod p002_fig4;
+mod p002_fig6;
+mod p002_fig8;
 mod report;
 mod sequence;
+mod stills;
+mod trend;
 mod two_grains;
 
 use std::ops::ControlFlow;
@@ -24,6 +32,11 @@ pub use sequence::Sequence;
 #[rustfmt::skip] // a line for each
 pub const STUDIES: &[&Study] = &[
     &p002_fig4::STUDY,
+    &p002_fig6::STUDY,
+    &p002_fig8::STUDY,
+    &p002_fig13::STUDY,
+    &p002_fig16::STUDY,
+    &p002_fig17::STUDY,
     &p002_fig18::STUDY,
     &two_grains::STUDY,
     &first_order_or_repeated::STUDY,
