@@ -24,7 +24,7 @@ pub use contact::{Collapse, Contact, Contacts, Friction, Regularised, StaticDyna
 pub use error::{Invalid, SceneError};
 pub(crate) use limits::{LARGEST, SMALLEST};
 pub use load::{Overrides, SceneFile};
-pub use measure::{FlowMeasure, Measure, Span};
+pub use measure::{EjectaMeasure, FlowMeasure, Measure, Span};
 pub use near_field::{Auto, DEFAULT_PENETRATION, NearField, Substep, Summation};
 pub use shape::schema;
 pub use stepped::{FixedPoint, SoftSphere, Trapezoidal};

@@ -1,10 +1,12 @@
 //! Measurements that a scene asks for under `[[measure]]`: each watches a run and gives tables, pictures and fields, with errors from batches.
 
+mod ejecta;
 mod flow;
 mod grid;
 mod window;
 
-pub use flow::Flow;
+pub use ejecta::{Ejecta, Ejected};
+pub use flow::{Flow, FlowCell, PARTS};
 pub use grid::Grid;
 pub use window::Window;
 
@@ -44,6 +46,7 @@ pub fn measurements(scene: &Scene) -> Vec<(String, Box<dyn Measurement>)> {
     let of = |measure: &Measure| -> Box<dyn Measurement> {
         match measure {
             Measure::Flow(flow) => Box::new(Flow::new(flow, scene)),
+            Measure::Ejecta(ejecta) => Box::new(Ejecta::new(ejecta, scene)),
         }
     };
     scene.measure_names().into_iter().zip(scene.measure.iter().map(of)).collect()

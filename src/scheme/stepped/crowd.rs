@@ -279,6 +279,7 @@ impl Crowd {
         if collision.ids[0] > collision.ids[1] {
             collision.ids.reverse();
             collision.normal = -collision.normal;
+            collision.impulse_tangential = -collision.impulse_tangential;
         }
         observer.grain_collision(&collision);
     }
