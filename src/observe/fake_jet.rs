@@ -172,7 +172,7 @@ impl<O: Observer> State<'_, O> {
             ids: [self.grains[a].id, self.grains[b].id],
             position: self.flights[a].position,
             normal,
-            distance: 2.0 * RADIUS,
+            radii: [RADIUS; 2],
             impulse_normal: impulse,
             impulse_tangential: Vector3::zeros(),
             approach_speed: approach,

@@ -119,8 +119,8 @@ pub struct GrainCollision {
     pub position: Vector3<f64>,
     /// Unit contact normal, from the first grain to the second.
     pub normal: Vector3<f64>,
-    /// Distance of the centres, m: the sum of the radii, but for what rounding or a soft contact makes of it.
-    pub distance: f64,
+    /// Their radii, m.
+    pub radii: [f64; 2],
     /// Normal impulse J_n, N s; it pushes the two apart.
     pub impulse_normal: f64,
     /// Tangential impulse on the second grain, N s.
@@ -136,10 +136,17 @@ pub struct GrainCollision {
 }
 
 impl GrainCollision {
+    /// The centres of both as they touch, m: a radius before and behind the contact point. In a periodic domain that of the second may be outside.
+    #[must_use]
+    pub fn centres(&self) -> [Vector3<f64>; 2] {
+        let [first, second] = self.radii;
+        [self.position - self.normal * first, self.position + self.normal * second]
+    }
+
     /// From the centre of the first grain to that of the second, m.
     #[must_use]
     pub fn branch(&self) -> Vector3<f64> {
-        self.normal * self.distance
+        self.normal * (self.radii[0] + self.radii[1])
     }
 
     /// The impulse on the second grain, N s; that on the first is its opposite.

@@ -19,8 +19,8 @@ use crate::shown::{Axis, Map, Picture, Table};
 ///
 /// **Stress.** The momentum that the flow carries across a unit area in a unit time, beyond what its mean velocity carries; positive where grains
 /// press. Kinetic: Σ m u' u' / V over the grains of a sample, u' being the deviation from the mean velocity of the cell. Contact:
-/// Σ l J / (V t) over the collisions of grains, with l from one centre to the other and J the impulse on the other, its symmetric part, in the cell of the
-/// contact point. Huang, Chan & Zamankhan (2010, section IV) print u'^kl u^k and a sum over all ordered pairs, in which each contact counts twice, over an
+/// Σ l J / (V t) over the collisions of grains, with l from one centre to the other and J the impulse on the other, its symmetric part; each cell gets the
+/// part of l that lies in it (Irving & Kirkwood 1950), so that what a layer carries does not depend on how the grains in it are stacked. Huang, Chan & Zamankhan (2010, section IV) print u'^kl u^k and a sum over all ordered pairs, in which each contact counts twice, over an
 /// area. What the surface gives to grains is not in it: where contacts with the surface carry, within a radius of it, the stress is that of the
 /// surface.
 ///
@@ -277,17 +277,20 @@ impl Observer for Flow {
     fn grain_collision(&mut self, collision: &GrainCollision) {
         let Some(batch) = self.window.batch(collision.time) else { return };
         let batch = &mut self.batches[batch];
-        let place = match self.period {
-            Some([min, side]) => {
-                collision.position.zip_zip_map(&min, &side, |x, low, side| low + (x - low).rem_euclid(side))
-            }
-            None => collision.position,
+        let virial = product(&collision.branch(), &collision.impulse());
+        let period = self.period;
+        let inside = |place: Vector3<f64>| match period {
+            Some([min, side]) => place.zip_zip_map(&min, &side, |x, low, side| low + (x - low).rem_euclid(side)),
+            None => place,
         };
-        let here = match self.grid.cell(&place) {
-            Some(cell) => &mut batch.cells[cell],
-            None => &mut batch.outside,
-        };
-        here.virial += product(&collision.branch(), &collision.impulse());
+        let [from, to] = collision.centres();
+        self.grid.pieces(from, to, |middle, part| {
+            let here = match self.grid.cell(&inside(middle)) {
+                Some(cell) => &mut batch.cells[cell],
+                None => &mut batch.outside,
+            };
+            here.virial += virial * part;
+        });
     }
 }
 
@@ -519,7 +522,7 @@ mod tests {
             ids: [0, 1],
             position: place,
             normal: Vector3::x(),
-            distance: 0.2,
+            radii: [0.1; 2],
             impulse_normal: 3.0,
             impulse_tangential: tangential,
             approach_speed: 1.0,

@@ -366,7 +366,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             ids,
             position: flight_a.position + normal * first.radius,
             normal,
-            distance,
+            radii: [first.radius, second.radius],
             impulse_normal: contact.impulse.normal,
             impulse_tangential: -contact.impulse.tangential,
             approach_speed: contact.approach_speed,

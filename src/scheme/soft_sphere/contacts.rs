@@ -257,21 +257,20 @@ impl Contact {
     /// Tells of the contact of two grains, over by now.
     pub(super) fn tell_pair(&self, crowd: &mut Crowd, time: f64, observer: &mut impl Observer) {
         let slots = [self.slot, self.partner].map(|slot| slot as usize);
-        let [first, second] = slots.map(|slot| crowd.flights[slot].radius);
+        let radii = slots.map(|slot| crowd.flights[slot].radius);
         let impulse_normal = self.impulse.dot(&self.touch.normal);
         let collision = GrainCollision {
             time,
             ids: slots.map(|slot| crowd.grains[slot].id),
             position: self.touch.position,
             normal: self.touch.normal,
-            // Where the contact began, as all that the record tells of its place.
-            distance: first + second,
+            radii,
             impulse_normal,
             impulse_tangential: self.impulse - self.touch.normal * impulse_normal,
             approach_speed: self.touch.approach_speed,
             dissipated: self.dissipated,
             withheld: 0.0,
-            overlap_over_radius: self.deepest / first.min(second),
+            overlap_over_radius: self.deepest / radii[0].min(radii[1]),
         };
         crowd.tell_collision(collision, observer);
     }

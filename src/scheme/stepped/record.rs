@@ -23,7 +23,7 @@ impl Crowd {
             ids: [a, b].map(|slot| self.grains[slot as usize].id),
             position: first.position + near.normal * first.radius,
             normal: near.normal,
-            distance: first.radius + second.radius + near.gap,
+            radii: [first.radius, second.radius],
             impulse_normal: contact.impulse.normal,
             impulse_tangential: -contact.impulse.tangential,
             approach_speed: contact.approach_speed,
