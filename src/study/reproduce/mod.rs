@@ -2,20 +2,26 @@
 //!
 //! A study is a file here (named after the paper's number and its figure) and a line in [`STUDIES`]. It gets [`Settings`] and gives a [`Report`]; it reads no file and writes none.
 //! What studies share: [`run_all`] (many runs on all cores, in a fixed order), [`Estimate`](crate::estimate::Estimate) (a mean and how sure it is),
-//! [`shown`](crate::shown) (tables and pictures as data), [`Jet`] (the reference jet) and [`Sequence`] (two grains and a wall, in closed form).
+//! [`shown`](crate::shown) (tables and pictures as data), [`Jet`] (the reference jet), `target_jet` (a jet on a target of its own width or so) and [`Sequence`] (two grains and a wall, in closed form).
 
 mod ensemble;
 mod first_order_or_repeated;
 mod jet;
+mod p001_fig1;
+mod p001_fig2;
+mod p001_fig3;
+mod p001_fig7;
+mod p001_fig9;
 mod p002_fig18;
 mod p002_fig4;
 mod report;
 mod sequence;
+mod target_jet;
 mod two_grains;
 
 use std::ops::ControlFlow;
 
-pub use ensemble::{Error, run_all};
+pub use ensemble::{Error, run_all, run_observed};
 pub use jet::{Energies, Jet};
 pub use report::{Finding, Report, Verdict};
 pub use sequence::Sequence;
@@ -23,6 +29,11 @@ pub use sequence::Sequence;
 /// All studies, in the order in which they are listed.
 #[rustfmt::skip] // a line for each
 pub const STUDIES: &[&Study] = &[
+    &p001_fig1::STUDY,
+    &p001_fig2::STUDY,
+    &p001_fig3::STUDY,
+    &p001_fig7::STUDY,
+    &p001_fig9::STUDY,
     &p002_fig4::STUDY,
     &p002_fig18::STUDY,
     &two_grains::STUDY,
