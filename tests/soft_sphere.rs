@@ -189,7 +189,7 @@ fn friction_between_grains_keeps_momentum_and_angular_momentum() {
     assert!(told.ledger.relative_momentum_residual() < 1e-14, "{}", told.ledger.relative_momentum_residual());
     assert!(told.ledger.relative_energy_residual().abs() < 2e-3, "{}", told.ledger.relative_energy_residual());
     let collision = &told.collisions[0];
-    assert!(collision.impulse_tangential > 0.1 * collision.impulse_normal);
+    assert!(collision.impulse_tangential.norm() > 0.1 * collision.impulse_normal);
     let [dizzy, other] = [&told.grains[0], &told.grains[1]].map(|grain| grain.spin);
     let change = dizzy - Vector3::new(100.0, -500.0, 900.0) - (other - Vector3::new(0.0, 300.0, 700.0));
     assert!(change.norm() < 1e-9 * 900.0, "equal spheres take up the same torque: {change}");

@@ -130,7 +130,7 @@ impl<W: Write> EventTable<W> {
 
 impl<W: Write> Observer for EventTable<W> {
     fn grain_collision(&mut self, event: &GrainCollision) {
-        let numbers = [event.impulse_normal, event.impulse_tangential, event.approach_speed];
+        let numbers = [event.impulse_normal, event.impulse_tangential.norm(), event.approach_speed];
         let place = [event.position.x, event.position.y, event.position.z];
         self.row((event.time, "grain-grain", event.ids, numbers, place));
     }

@@ -6,8 +6,11 @@ use serde::{Deserialize, Serialize};
 use super::limits::{Checked, positive};
 use super::{Invalid, PlaneSurface, Run, Scene, Surface, Vec3};
 
-/// Most cells of a grid times batches: each holds a dozen numbers, so that these fill 2 GB. More is a misplaced digit.
-const CELLS_MAX: u64 = 20_000_000;
+/// Most cells of a grid times batches: each holds eighteen numbers, so that these fill 2 GB. More is a misplaced digit.
+const CELLS_MAX: u64 = 14_000_000;
+
+/// Most bins of a distribution over angles: finer ones hold no grains.
+const BINS_MAX: u32 = 18_000;
 
 /// So much of its size may rounding put a grid above the plane that it reaches up to.
 const ROUNDING: f64 = 1e-12;
@@ -16,12 +19,14 @@ const ROUNDING: f64 = 1e-12;
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema, PartialEq)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Measure {
-    /// Density, velocity and granular temperature on a grid, averaged over time.
+    /// Density, velocity, granular temperature and stress on a grid, averaged over time.
     Flow(FlowMeasure),
     /// Energy that grains bring to the surface, over time and by hit order.
     SurfaceEnergy(SurfaceEnergyMeasure),
     /// Stress and damage that every hit on a plane makes in the solid below it.
     Subsurface(SubsurfaceMeasure),
+    /// Directions in which mass leaves the domain: opening angle, half-mass angle, distribution.
+    Ejecta(EjectaMeasure),
 }
 
 /// `kind = "flow"`
@@ -43,6 +48,35 @@ pub struct FlowMeasure {
     /// Batches that tell how sure the averages are.
     #[serde(default = "default_batches")]
     pub batches: u32,
+}
+
+/// `kind = "ejecta"`
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct EjectaMeasure {
+    /// Name of its folder; left out, its kind.
+    pub name: Option<String>,
+    /// Direction of the jet, from which angles count; any length but 0. Left out, straight down.
+    #[serde(default = "down")]
+    pub axis: Vec3,
+    /// Bins of the distribution, from 0 to 180 degrees.
+    #[serde(default = "default_bins")]
+    pub bins: u32,
+    /// When it begins, s; left out, at the start of the run.
+    pub from: Option<f64>,
+    /// When it ends, s; left out, at the end of the run.
+    pub until: Option<f64>,
+    /// Batches that tell how sure the angles are.
+    #[serde(default = "default_batches")]
+    pub batches: u32,
+}
+
+fn down() -> Vec3 {
+    [0.0, 0.0, -1.0]
+}
+
+fn default_bins() -> u32 {
+    90
 }
 
 fn default_batches() -> u32 {
@@ -175,6 +209,7 @@ impl Measure {
             Self::Flow(flow) => flow.name.as_deref(),
             Self::SurfaceEnergy(energy) => energy.name.as_deref(),
             Self::Subsurface(subsurface) => subsurface.name.as_deref(),
+            Self::Ejecta(ejecta) => ejecta.name.as_deref(),
         }
     }
 
@@ -183,6 +218,7 @@ impl Measure {
             Self::Flow(_) => "flow",
             Self::SurfaceEnergy(_) => "surface-energy",
             Self::Subsurface(_) => "subsurface",
+            Self::Ejecta(_) => "ejecta",
         }
     }
 
@@ -193,6 +229,7 @@ impl Measure {
             Self::Flow(FlowMeasure { from, until, batches, .. }) => Span { from, until, batches },
             Self::SurfaceEnergy(SurfaceEnergyMeasure { from, until, batches, .. }) => Span { from, until, batches },
             Self::Subsurface(SubsurfaceMeasure { from, until, batches, .. }) => Span { from, until, batches },
+            Self::Ejecta(EjectaMeasure { from, until, batches, .. }) => Span { from, until, batches },
         }
     }
 }
@@ -234,6 +271,7 @@ pub(super) fn check(scene: &Scene) -> Checked {
             Measure::Flow(flow) => check_grid(&key, flow.min, flow.max, flow.cells, flow.batches, scene)?,
             Measure::SurfaceEnergy(_) => {}
             Measure::Subsurface(subsurface) => check_subsurface(&key, subsurface, scene)?,
+            Measure::Ejecta(ejecta) => check_ejecta(&key, ejecta)?,
         }
     }
     Ok(())
@@ -259,6 +297,19 @@ fn check_span(key: &impl Fn(&str) -> String, span: Span, run: &Run) -> Checked {
     Ok(())
 }
 
+fn check_ejecta(key: &impl Fn(&str) -> String, ejecta: &EjectaMeasure) -> Checked {
+    let length = ejecta.axis.iter().map(|part| part * part).sum::<f64>();
+    if !(length.is_finite() && length > 0.0) {
+        let what = format!("{:?} has no direction", ejecta.axis);
+        return Err(Invalid::new(key("axis"), what, "give the direction of the jet, such as [0, 0, -1]"));
+    }
+    if !(1..=BINS_MAX).contains(&ejecta.bins) {
+        let what = format!("{} bins over 180 degrees are none, or too fine to hold grains", ejecta.bins);
+        return Err(Invalid::new(key("bins"), what, "90 is usual: two degrees each"));
+    }
+    Ok(())
+}
+
 fn check_grid(
     key: &impl Fn(&str) -> String,
     min: Option<Vec3>,
@@ -277,6 +328,15 @@ fn check_grid(
         if cells[axis] == 0 {
             return Err(Invalid::new(key("cells"), format!("there are no cells along {name}"), "use 1 or more"));
         }
+    }
+    if scene.domain.planar && !(min[1] <= 0.0 && max[1] > 0.0) {
+        let what =
+            format!("along y the grid reaches from {} to {} m, past the plane y = 0 of the grains", min[1], max[1]);
+        return Err(Invalid::new(
+            key("min"),
+            what,
+            "let it hold that plane, with a diameter of a grain as its thickness",
+        ));
     }
     let count = cells.iter().map(|&count| u64::from(count)).fold(u64::from(batches), u64::saturating_mul);
     if count > CELLS_MAX {

@@ -24,7 +24,9 @@ pub use contact::{Collapse, Contact, Contacts, Friction, Regularised, StaticDyna
 pub use error::{Invalid, SceneError};
 pub(crate) use limits::{LARGEST, SMALLEST};
 pub use load::{Overrides, SceneFile};
-pub use measure::{ContactTime, Elastic, FlowMeasure, Measure, Span, SubsurfaceMeasure, SurfaceEnergyMeasure};
+pub use measure::{
+    ContactTime, EjectaMeasure, Elastic, FlowMeasure, Measure, Span, SubsurfaceMeasure, SurfaceEnergyMeasure,
+};
 pub use near_field::{Auto, DEFAULT_PENETRATION, NearField, Substep, Summation};
 pub use shape::schema;
 pub use stepped::{FixedPoint, SoftSphere, Trapezoidal};

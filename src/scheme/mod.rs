@@ -119,10 +119,12 @@ pub struct GrainCollision {
     pub position: Vector3<f64>,
     /// Unit contact normal, from the first grain to the second.
     pub normal: Vector3<f64>,
+    /// Their radii, m.
+    pub radii: [f64; 2],
     /// Normal impulse J_n, N s; it pushes the two apart.
     pub impulse_normal: f64,
-    /// Magnitude of the tangential impulse J_t, N s.
-    pub impulse_tangential: f64,
+    /// Tangential impulse on the second grain, N s.
+    pub impulse_tangential: Vector3<f64>,
     /// Normal speed of approach before the collision, m/s.
     pub approach_speed: f64,
     /// Kinetic energy dissipated, J.
@@ -131,6 +133,27 @@ pub struct GrainCollision {
     pub withheld: f64,
     /// Overlap at the event over the smaller radius: what rounding left (negative: a gap).
     pub overlap_over_radius: f64,
+}
+
+impl GrainCollision {
+    /// The centres of both as they touch, m: a radius before and behind the contact point. In a periodic domain that of the second may be outside.
+    #[must_use]
+    pub fn centres(&self) -> [Vector3<f64>; 2] {
+        let [first, second] = self.radii;
+        [self.position - self.normal * first, self.position + self.normal * second]
+    }
+
+    /// From the centre of the first grain to that of the second, m.
+    #[must_use]
+    pub fn branch(&self) -> Vector3<f64> {
+        self.normal * (self.radii[0] + self.radii[1])
+    }
+
+    /// The impulse on the second grain, N s; that on the first is its opposite.
+    #[must_use]
+    pub fn impulse(&self) -> Vector3<f64> {
+        self.normal * self.impulse_normal + self.impulse_tangential
+    }
 }
 
 /// A collision between a grain and the surface, as observers see it.

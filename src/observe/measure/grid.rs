@@ -70,6 +70,38 @@ impl Grid {
         Some((z * ny + y) * nx + x)
     }
 
+    /// Cuts the line from one place to another (m) where it crosses from cell to cell, and hands `take` the middle of each piece and the part of the
+    /// line that it is. Outside, cells go on as inside.
+    pub fn pieces(&self, from: Vector3<f64>, to: Vector3<f64>, mut take: impl FnMut(Vector3<f64>, f64)) {
+        let along = to - from;
+        let spacing = self.spacing();
+        let cell = |place: &Vector3<f64>, axis: usize| ((place[axis] - self.min[axis]) / spacing[axis]).floor();
+        // Of each axis how many sides are left to cross, the number of the next one, and the way on.
+        let mut sides = [0, 1, 2].map(|axis| {
+            let [start, end] = [&from, &to].map(|place| cell(place, axis));
+            let way = (end - start).signum();
+            ((end - start).abs(), if way > 0.0 { start + 1.0 } else { start }, way)
+        });
+        let mut done = 0.0;
+        loop {
+            let crossing = |axis: usize| match sides[axis] {
+                (left, side, _) if left > 0.0 => (self.min[axis] + side * spacing[axis] - from[axis]) / along[axis],
+                _ => f64::INFINITY,
+            };
+            let at = [0, 1, 2].map(crossing);
+            let axis = (0..3).fold(0, |first, axis| if at[axis] < at[first] { axis } else { first });
+            // Rounding may see a side just before the last one, or just beyond the end.
+            let end = at[axis].clamp(done, 1.0);
+            take(from + along * (0.5 * (done + end)), end - done);
+            if at[axis] == f64::INFINITY {
+                return;
+            }
+            let (left, side, way) = &mut sides[axis];
+            (*left, *side) = (*left - 1.0, *side + *way);
+            done = end;
+        }
+    }
+
     /// The middle of a cell, m.
     #[must_use]
     pub fn centre(&self, cell: usize) -> Vector3<f64> {
@@ -77,5 +109,27 @@ impl Grid {
         let index = [cell % nx, cell / nx % ny, cell / (nx * ny)];
         let spacing = self.spacing();
         Vector3::from_fn(|axis, _| self.min[axis] + (index[axis] as f64 + 0.5) * spacing[axis])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_cut_where_it_leaves_a_cell() {
+        let grid = Grid { min: [0.0; 3], max: [2.0, 1.0, 3.0], cells: [2, 1, 3] };
+        let pieces = |from: [f64; 3], to: [f64; 3]| {
+            let mut pieces = Vec::new();
+            grid.pieces(from.into(), to.into(), |middle, part| pieces.push((grid.cell(&middle), part)));
+            pieces
+        };
+        assert_eq!(pieces([0.25, 0.5, 0.5], [0.75, 0.5, 0.5]), [(Some(0), 1.0)]);
+        assert_eq!(pieces([1.5, 0.5, 0.5], [0.5, 0.5, 0.5]), [(Some(1), 0.5), (Some(0), 0.5)]);
+        // Across x at half of the way, across z at a quarter and three quarters.
+        let expected = [(Some(0), 0.25), (Some(2), 0.25), (Some(3), 0.25), (Some(5), 0.25)];
+        assert_eq!(pieces([0.5, 0.5, 0.5], [1.5, 0.5, 2.5]), expected);
+        // Out through the upper side of the box.
+        assert_eq!(pieces([0.5, 0.5, 2.5], [0.5, 0.5, 3.5]), [(Some(4), 0.5), (None, 0.5)]);
     }
 }

@@ -1,12 +1,14 @@
 //! Measurements that a scene asks for under `[[measure]]`: each watches a run and gives tables, pictures and fields, with errors from batches.
 
+mod ejecta;
 mod flow;
 mod grid;
 mod subsurface;
 mod surface_energy;
 mod window;
 
-pub use flow::Flow;
+pub use ejecta::{Ejecta, Ejected};
+pub use flow::{Flow, FlowCell, PARTS};
 pub use grid::Grid;
 pub use subsurface::{Contact, DamageCell, HalfSpace, Subsurface};
 pub use surface_energy::{EnergyInTime, interference_parameter};
@@ -50,6 +52,7 @@ pub fn measurements(scene: &Scene) -> Vec<(String, Box<dyn Measurement>)> {
             Measure::Flow(flow) => Box::new(Flow::new(flow, scene)),
             Measure::SurfaceEnergy(energy) => Box::new(EnergyInTime::new(energy, scene)),
             Measure::Subsurface(subsurface) => Box::new(Subsurface::new(subsurface, scene)),
+            Measure::Ejecta(ejecta) => Box::new(Ejecta::new(ejecta, scene)),
         }
     };
     scene.measure_names().into_iter().zip(scene.measure.iter().map(of)).collect()

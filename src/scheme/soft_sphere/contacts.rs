@@ -30,8 +30,6 @@ pub(super) struct Contact {
     power: f64,
     /// Impulse on the partner, N s.
     impulse: Vector3<f64>,
-    /// Sum of the magnitudes of the impulses along the slip, N s.
-    tangential: f64,
     dissipated: f64,
     deepest: f64,
     /// Step in which the two touched last.
@@ -211,7 +209,6 @@ impl Contact {
             force: 0.0,
             power: 0.0,
             impulse: Vector3::zeros(),
-            tangential: 0.0,
             dissipated: 0.0,
             deepest: 0.0,
             seen: 0,
@@ -254,25 +251,26 @@ impl Contact {
     /// Books an impulse along the slip on the partner (N s), and what it dissipates, J.
     pub(super) fn book_friction(&mut self, on_partner: Vector3<f64>, dissipated: f64) {
         self.impulse += on_partner;
-        self.tangential += on_partner.norm();
         self.dissipated += dissipated;
     }
 
     /// Tells of the contact of two grains, over by now.
     pub(super) fn tell_pair(&self, crowd: &mut Crowd, time: f64, observer: &mut impl Observer) {
         let slots = [self.slot, self.partner].map(|slot| slot as usize);
+        let radii = slots.map(|slot| crowd.flights[slot].radius);
+        let impulse_normal = self.impulse.dot(&self.touch.normal);
         let collision = GrainCollision {
             time,
             ids: slots.map(|slot| crowd.grains[slot].id),
             position: self.touch.position,
             normal: self.touch.normal,
-            impulse_normal: self.impulse.dot(&self.touch.normal),
-            impulse_tangential: self.tangential,
+            radii,
+            impulse_normal,
+            impulse_tangential: self.impulse - self.touch.normal * impulse_normal,
             approach_speed: self.touch.approach_speed,
             dissipated: self.dissipated,
             withheld: 0.0,
-            overlap_over_radius: self.deepest
-                / slots.map(|slot| crowd.flights[slot].radius).into_iter().fold(f64::INFINITY, f64::min),
+            overlap_over_radius: self.deepest / radii[0].min(radii[1]),
         };
         crowd.tell_collision(collision, observer);
     }

@@ -278,7 +278,9 @@ impl Crowd {
         self.collisions += 1;
         if collision.ids[0] > collision.ids[1] {
             collision.ids.reverse();
+            collision.radii.reverse();
             collision.normal = -collision.normal;
+            collision.impulse_tangential = -collision.impulse_tangential;
         }
         observer.grain_collision(&collision);
     }

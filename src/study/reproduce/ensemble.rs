@@ -36,19 +36,33 @@ pub fn run_all<K: Sync, O: Observer + Default, T: Send>(
     scene: impl Fn(&K) -> Scene + Sync,
     measure: impl Fn(O) -> T + Sync,
 ) -> Result<Vec<T>, Error> {
+    run_observed(tasks, settings, scene, |_| O::default(), |_, observer| measure(observer))
+}
+
+/// The same with observers that depend on the task, such as measurements over a grid.
+///
+/// # Errors
+/// The first that a run gives.
+pub fn run_observed<K: Sync, O: Observer, T: Send>(
+    tasks: &[K],
+    settings: &Settings<'_>,
+    scene: impl Fn(&K) -> Scene + Sync,
+    observer: impl Fn(&K) -> O + Sync,
+    measure: impl Fn(&K, O) -> T + Sync,
+) -> Result<Vec<T>, Error> {
     let done = AtomicUsize::new(0);
     let watch = || (settings.watch)(done.load(Ordering::Relaxed) as f64 / tasks.len() as f64);
     let run = |task: &K| {
         if watch().is_break() {
             return Err(Error::BrokenOff);
         }
-        let mut observer = O::default();
+        let mut observer = observer(task);
         let mut simulation = Simulation::new(&scene(task), "".as_ref())?;
         if simulation.run(&mut observer, &mut |_| watch())?.interrupted {
             return Err(Error::BrokenOff);
         }
         done.fetch_add(1, Ordering::Relaxed);
-        Ok(measure(observer))
+        Ok(measure(task, observer))
     };
     // One task at a time: tasks differ by a factor of a million.
     tasks.par_iter().with_max_len(1).map(run).collect()

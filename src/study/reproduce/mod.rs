@@ -2,12 +2,18 @@
 //!
 //! A study is a file here (named after the paper's number and its figure) and a line in [`STUDIES`]. It gets [`Settings`] and gives a [`Report`]; it reads no file and writes none.
 //! What studies share: [`run_all`] (many runs on all cores, in a fixed order), [`Estimate`](crate::estimate::Estimate) (a mean and how sure it is),
-//! [`shown`](crate::shown) (tables and pictures as data), [`Jet`] (the reference jet), [`trend`] (whether a series falls, beyond its errors) and [`Sequence`] (two grains and a wall, in closed form).
+//! [`shown`](crate::shown) (tables and pictures as data), [`Jet`] (the reference jet), `target_jet` (a jet on a target of about its own width), `trend` (whether a series falls, beyond its
+//! errors) and [`Sequence`] (two grains and a wall, in closed form).
 
 mod arrivals;
 mod ensemble;
 mod first_order_or_repeated;
 mod jet;
+mod p001_fig1;
+mod p001_fig2;
+mod p001_fig3;
+mod p001_fig7;
+mod p001_fig9;
 mod p002_fig13;
 mod p002_fig16;
 mod p002_fig17;
@@ -18,12 +24,13 @@ mod p002_fig8;
 mod report;
 mod sequence;
 mod stills;
+mod target_jet;
 mod trend;
 mod two_grains;
 
 use std::ops::ControlFlow;
 
-pub use ensemble::{Error, run_all};
+pub use ensemble::{Error, run_all, run_observed};
 pub use jet::{Energies, Jet};
 pub use report::{Finding, Report, Verdict};
 pub use sequence::Sequence;
@@ -31,6 +38,11 @@ pub use sequence::Sequence;
 /// All studies, in the order in which they are listed.
 #[rustfmt::skip] // a line for each
 pub const STUDIES: &[&Study] = &[
+    &p001_fig1::STUDY,
+    &p001_fig2::STUDY,
+    &p001_fig3::STUDY,
+    &p001_fig7::STUDY,
+    &p001_fig9::STUDY,
     &p002_fig4::STUDY,
     &p002_fig6::STUDY,
     &p002_fig8::STUDY,
