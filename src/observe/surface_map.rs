@@ -201,7 +201,7 @@ impl PlaneMap {
 }
 
 /// Two unit vectors across `normal`, the first as near as can be to the coordinate axis that is most nearly across it.
-fn axes_along(normal: &Vector3<f64>) -> [Vector3<f64>; 2] {
+pub(super) fn axes_along(normal: &Vector3<f64>) -> [Vector3<f64>; 2] {
     let axis = if normal.x.abs() <= normal.y.abs().max(normal.z.abs()) { Vector3::x() } else { Vector3::y() };
     let first = (axis - normal * normal.dot(&axis)).normalize();
     [first, normal.cross(&first)]

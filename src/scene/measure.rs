@@ -4,10 +4,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::limits::Checked;
+use super::outflow::{self, OutflowMeasure};
+use super::surface_stress::{self, SurfaceStressMeasure};
 use super::{Invalid, Run, Scene, Vec3};
 
 /// Most cells of a grid times batches: each holds a dozen numbers, so that these fill 2 GB. More is a misplaced digit.
-const CELLS_MAX: u64 = 20_000_000;
+pub(super) const CELLS_MAX: u64 = 20_000_000;
 
 /// `[[measure]]`: something to be measured; its results go into `measures/NAME`.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema, PartialEq)]
@@ -15,6 +17,10 @@ const CELLS_MAX: u64 = 20_000_000;
 pub enum Measure {
     /// Density, velocity and granular temperature on a grid, averaged over time.
     Flow(FlowMeasure),
+    /// Normal and shear stress on patches of the surface.
+    SurfaceStress(SurfaceStressMeasure),
+    /// What leaves through the sides of the domain, over height.
+    Outflow(OutflowMeasure),
 }
 
 /// `kind = "flow"`
@@ -38,7 +44,7 @@ pub struct FlowMeasure {
     pub batches: u32,
 }
 
-fn default_batches() -> u32 {
+pub(super) fn default_batches() -> u32 {
     10
 }
 
@@ -65,12 +71,16 @@ impl Measure {
     fn name(&self) -> Option<&str> {
         match self {
             Self::Flow(flow) => flow.name.as_deref(),
+            Self::SurfaceStress(stress) => stress.name.as_deref(),
+            Self::Outflow(outflow) => outflow.name.as_deref(),
         }
     }
 
     fn kind(&self) -> &'static str {
         match self {
             Self::Flow(_) => "flow",
+            Self::SurfaceStress(_) => "surface-stress",
+            Self::Outflow(_) => "outflow",
         }
     }
 
@@ -78,7 +88,9 @@ impl Measure {
     #[must_use]
     pub fn span(&self) -> Span {
         match *self {
-            Self::Flow(FlowMeasure { from, until, batches, .. }) => Span { from, until, batches },
+            Self::Flow(FlowMeasure { from, until, batches, .. })
+            | Self::SurfaceStress(SurfaceStressMeasure { from, until, batches, .. })
+            | Self::Outflow(OutflowMeasure { from, until, batches, .. }) => Span { from, until, batches },
         }
     }
 }
@@ -107,6 +119,8 @@ pub(super) fn check(scene: &Scene) -> Checked {
         check_span(&key, measure.span(), &scene.run)?;
         match measure {
             Measure::Flow(flow) => check_grid(&key, flow.min, flow.max, flow.cells, flow.batches, scene)?,
+            Measure::SurfaceStress(stress) => surface_stress::check(&key, stress, scene)?,
+            Measure::Outflow(outflow) => outflow::check(&key, outflow, scene)?,
         }
     }
     Ok(())
