@@ -52,6 +52,29 @@ impl Estimate {
         Self { value, error: Self::mean(&deviations).error }
     }
 
+    /// Any number that is computed from batches, as the jackknife knows it (Efron 1982): `of` gives it from all batches (`None`) and from all but
+    /// one, and the error is √((n - 1)/n Σ (x - mean)²) over what it gives without each. For a mean that is the error of
+    /// [`mean`](Self::mean); it also holds for ratios and moments, and correlations within a batch are in it.
+    ///
+    /// ```
+    /// use impinge::estimate::Estimate;
+    ///
+    /// let batches = [1.0, 2.0, 3.0, 6.0_f64];
+    /// let mean = |without: Option<usize>| {
+    ///     let kept: Vec<f64> = (0..4).filter(|&i| Some(i) != without).map(|i| batches[i]).collect();
+    ///     kept.iter().sum::<f64>() / kept.len() as f64
+    /// };
+    /// let [jackknife, plain] = [Estimate::jackknife(4, mean), Estimate::mean(&batches)];
+    /// assert!((jackknife.error - plain.error).abs() < 1e-15 && jackknife.value == plain.value);
+    /// ```
+    #[must_use]
+    pub fn jackknife(batches: usize, of: impl Fn(Option<usize>) -> f64) -> Self {
+        let without: Vec<f64> = (0..batches).map(|batch| of(Some(batch))).collect();
+        let count = batches as f64;
+        let error = if batches > 1 { Self::mean(&without).error * (count - 1.0) } else { f64::INFINITY };
+        Self { value: of(None), error }
+    }
+
     /// Its natural logarithm.
     #[must_use]
     pub fn ln(self) -> Self {

@@ -81,19 +81,27 @@ pub struct Axis {
     pub scale: Scale,
     /// From where to where.
     pub range: [f64; 2],
+    /// Whether it is a length: a map over two lengths in the same unit is drawn to scale.
+    pub is_length: bool,
 }
 
 impl Axis {
     /// An evenly divided axis.
     #[must_use]
     pub fn linear(label: impl Into<String>, low: f64, high: f64) -> Self {
-        Self { label: label.into(), scale: Scale::Linear, range: [low, high] }
+        Self { label: label.into(), scale: Scale::Linear, range: [low, high], is_length: false }
+    }
+
+    /// An evenly divided axis that shows a length, in the unit of the other axis.
+    #[must_use]
+    pub fn length(label: impl Into<String>, low: f64, high: f64) -> Self {
+        Self { is_length: true, ..Self::linear(label, low, high) }
     }
 
     /// A logarithmic axis.
     #[must_use]
     pub fn log(label: impl Into<String>, low: f64, high: f64) -> Self {
-        Self { label: label.into(), scale: Scale::Log, range: [low, high] }
+        Self { label: label.into(), scale: Scale::Log, range: [low, high], is_length: false }
     }
 }
 
@@ -175,11 +183,12 @@ pub struct Map {
     pub x: Axis,
     /// Bottom to top; linear.
     pub y: Axis,
-    /// Values ≥ 0 of the columns from left to right, each from bottom to top; `None` is grey.
+    /// Values of the columns from left to right, each from bottom to top; `None` is grey. Where any is below 0 colours diverge: white is 0, red
+    /// above and blue below.
     pub columns: Vec<Vec<Option<f64>>>,
     /// What the colours stand for.
     pub legend: String,
-    /// The value of the brightest colour; more is not brighter.
+    /// The value of the brightest colour; more is not brighter. Where colours diverge, the value above and below 0 of the deepest ones.
     pub most: f64,
     /// What grey stands for.
     pub grey: String,

@@ -16,6 +16,9 @@ pub(super) fn write(folder: &Folder, name: &str, results: &Results, pictures: bo
     if let Some(fields) = &results.fields {
         folder.write(&file("fields", "vti"), |out| vtk::write_fields(out, fields))?;
     }
+    if let Some(facets) = &results.facets {
+        folder.write(&file("patches", "vtp"), |out| vtk::write_facets(out, facets))?;
+    }
     for picture in results.pictures.iter().filter(|_| pictures) {
         let name = file(picture.name(), "svg");
         let svg = plots::drawn(picture).map_err(folder.failed(&name))?;

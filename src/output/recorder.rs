@@ -92,7 +92,7 @@ impl Recorder {
             surface: SurfaceEnergy::default(),
             map: SurfaceMap::new(&shape, mean_radius),
             history: History::default(),
-            measures: measurements(scene),
+            measures: measurements(scene, &shape),
             side_view: SideView::new(scene),
             events,
             frames: Vec::new(),

@@ -10,7 +10,7 @@ use flate2::write::ZlibEncoder;
 use nalgebra::Vector3;
 
 use crate::grains::{Snapshot, kinetic_energy};
-use crate::observe::measure::{Fields, Grid};
+use crate::observe::measure::{FacetFields, Fields, Grid};
 use crate::observe::{PlaneMap, SurfaceMap, SurfaceShape, Tally};
 use crate::scene::Domain;
 
@@ -156,6 +156,25 @@ pub fn write_fields(out: &mut dyn Write, fields: &Fields) -> io::Result<()> {
         .iter()
         .map(|(name, components, values)| Array::new(name, *components, Values::scalars(values.iter().copied())));
     write_data(out, "ImageData", &attributes, &format!(r#"Extent="{extent}""#), [("CellData", arrays.collect())])
+}
+
+/// Writes values on patches of the surface.
+///
+/// # Errors
+/// Those of `out`.
+pub fn write_facets(out: &mut dyn Write, facets: &FacetFields) -> io::Result<()> {
+    let mut polygons = Cells::default();
+    let mut first = 0;
+    for corners in &facets.corners {
+        polygons.add(first..first + corners.len());
+        first += corners.len();
+    }
+    let arrays = facets
+        .arrays
+        .iter()
+        .map(|(name, components, values)| Array::new(name, *components, Values::scalars(values.iter().copied())));
+    let of_cells = arrays.collect();
+    PolyData { points: facets.corners.concat(), polygons, of_cells, ..PolyData::default() }.write(out)
 }
 
 /// Appends an array: number of blocks, size of a block, size of the last if it is shorter, compressed sizes, blocks.

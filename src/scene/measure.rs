@@ -4,10 +4,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::limits::{Checked, positive};
+use super::outflow::{self, OutflowMeasure};
+use super::surface_stress::{self, SurfaceStressMeasure};
 use super::{Invalid, PlaneSurface, Run, Scene, Surface, Vec3};
 
 /// Most cells of a grid times batches: each holds eighteen numbers, so that these fill 2 GB. More is a misplaced digit.
-const CELLS_MAX: u64 = 14_000_000;
+pub(super) const CELLS_MAX: u64 = 14_000_000;
 
 /// Most bins of a distribution over angles: finer ones hold no grains.
 const BINS_MAX: u32 = 18_000;
@@ -27,6 +29,10 @@ pub enum Measure {
     Subsurface(SubsurfaceMeasure),
     /// Directions in which mass leaves the domain: opening angle, half-mass angle, distribution.
     Ejecta(EjectaMeasure),
+    /// Normal and shear stress on patches of the surface.
+    SurfaceStress(SurfaceStressMeasure),
+    /// What leaves through the sides of the domain, over height.
+    Outflow(OutflowMeasure),
 }
 
 /// `kind = "flow"`
@@ -79,7 +85,7 @@ fn default_bins() -> u32 {
     90
 }
 
-fn default_batches() -> u32 {
+pub(super) fn default_batches() -> u32 {
     10
 }
 
@@ -210,6 +216,8 @@ impl Measure {
             Self::SurfaceEnergy(energy) => energy.name.as_deref(),
             Self::Subsurface(subsurface) => subsurface.name.as_deref(),
             Self::Ejecta(ejecta) => ejecta.name.as_deref(),
+            Self::SurfaceStress(stress) => stress.name.as_deref(),
+            Self::Outflow(outflow) => outflow.name.as_deref(),
         }
     }
 
@@ -219,6 +227,8 @@ impl Measure {
             Self::SurfaceEnergy(_) => "surface-energy",
             Self::Subsurface(_) => "subsurface",
             Self::Ejecta(_) => "ejecta",
+            Self::SurfaceStress(_) => "surface-stress",
+            Self::Outflow(_) => "outflow",
         }
     }
 
@@ -226,10 +236,12 @@ impl Measure {
     #[must_use]
     pub fn span(&self) -> Span {
         match *self {
-            Self::Flow(FlowMeasure { from, until, batches, .. }) => Span { from, until, batches },
-            Self::SurfaceEnergy(SurfaceEnergyMeasure { from, until, batches, .. }) => Span { from, until, batches },
-            Self::Subsurface(SubsurfaceMeasure { from, until, batches, .. }) => Span { from, until, batches },
-            Self::Ejecta(EjectaMeasure { from, until, batches, .. }) => Span { from, until, batches },
+            Self::Flow(FlowMeasure { from, until, batches, .. })
+            | Self::SurfaceEnergy(SurfaceEnergyMeasure { from, until, batches, .. })
+            | Self::Subsurface(SubsurfaceMeasure { from, until, batches, .. })
+            | Self::Ejecta(EjectaMeasure { from, until, batches, .. })
+            | Self::SurfaceStress(SurfaceStressMeasure { from, until, batches, .. })
+            | Self::Outflow(OutflowMeasure { from, until, batches, .. }) => Span { from, until, batches },
         }
     }
 }
@@ -272,6 +284,8 @@ pub(super) fn check(scene: &Scene) -> Checked {
             Measure::SurfaceEnergy(_) => {}
             Measure::Subsurface(subsurface) => check_subsurface(&key, subsurface, scene)?,
             Measure::Ejecta(ejecta) => check_ejecta(&key, ejecta)?,
+            Measure::SurfaceStress(stress) => surface_stress::check(&key, stress, scene)?,
+            Measure::Outflow(outflow) => outflow::check(&key, outflow, scene)?,
         }
     }
     Ok(())

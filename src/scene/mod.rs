@@ -12,8 +12,10 @@ mod limits;
 mod load;
 mod measure;
 mod near_field;
+mod outflow;
 mod shape;
 mod stepped;
+mod surface_stress;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -28,8 +30,10 @@ pub use measure::{
     ContactTime, EjectaMeasure, Elastic, FlowMeasure, Measure, Span, SubsurfaceMeasure, SurfaceEnergyMeasure,
 };
 pub use near_field::{Auto, DEFAULT_PENETRATION, NearField, Substep, Summation};
+pub use outflow::{OutflowMeasure, Side};
 pub use shape::schema;
 pub use stepped::{FixedPoint, SoftSphere, Trapezoidal};
+pub use surface_stress::{FreeJet, PatchGrid, SurfaceStressMeasure};
 
 /// A vector as it stands in the file: `[x, y, z]`.
 pub type Vec3 = [f64; 3];

@@ -248,7 +248,7 @@ impl Measurement for Ejecta {
                 guide("", high, Mark::Dashed, 2),
             ],
         };
-        Results { tables: vec![table, angles], pictures: vec![Picture::Chart(chart)], fields: None }
+        Results { tables: vec![table, angles], pictures: vec![Picture::Chart(chart)], ..Results::default() }
     }
 }
 

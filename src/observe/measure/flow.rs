@@ -301,6 +301,7 @@ impl Measurement for Flow {
             tables: vec![table(&self.grid, &cells), stress_table(&self.grid, &cells)],
             pictures: self.pictures(),
             fields: Some(fields(self.grid, &cells)),
+            ..Results::default()
         }
     }
 }
@@ -417,8 +418,8 @@ impl Flow {
                     name,
                     title: title.into(),
                     shows: format!("Averaged from {} to {} s and along y", self.window.from, self.window.until),
-                    x: Axis::linear("x / m", self.grid.min[0], self.grid.max[0]),
-                    y: Axis::linear("z / m", self.grid.min[2], self.grid.max[2]),
+                    x: Axis::length("x / m", self.grid.min[0], self.grid.max[0]),
+                    y: Axis::length("z / m", self.grid.min[2], self.grid.max[2]),
                     columns,
                     legend: legend.into(),
                     most,

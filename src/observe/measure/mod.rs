@@ -2,18 +2,29 @@
 
 mod ejecta;
 mod flow;
+mod free_jet;
 mod grid;
+mod outflow;
+mod patches;
 mod subsurface;
 mod surface_energy;
+mod surface_stress;
 mod window;
 
 pub use ejecta::{Ejecta, Ejected};
 pub use flow::{Flow, FlowCell, PARTS};
+pub use free_jet::FreeJet;
 pub use grid::Grid;
+pub use outflow::{Outflow, Profile, ProfileMoments, Quantity};
+pub use patches::{Patch, Patches};
 pub use subsurface::{Contact, DamageCell, HalfSpace, Subsurface};
 pub use surface_energy::{EnergyInTime, interference_parameter};
+pub use surface_stress::{PatchStress, Stress, SurfaceStress};
 pub use window::Window;
 
+use nalgebra::Vector3;
+
+use super::SurfaceShape;
 use crate::scene::{Measure, Scene};
 use crate::scheme::Observer;
 use crate::shown::{Picture, Table};
@@ -33,6 +44,8 @@ pub struct Results {
     pub pictures: Vec<Picture>,
     /// What has a value in each cell of a grid, for ParaView.
     pub fields: Option<Fields>,
+    /// What has a value on each patch of the surface, for ParaView.
+    pub facets: Option<FacetFields>,
 }
 
 /// Values in the cells of a grid.
@@ -44,15 +57,26 @@ pub struct Fields {
     pub arrays: Vec<(&'static str, usize, Vec<f64>)>,
 }
 
-/// The measurements of a scene, each with the name of its folder.
+/// Values on patches of the surface.
+#[derive(Clone, Debug)]
+pub struct FacetFields {
+    /// Corners of each patch, m.
+    pub corners: Vec<Vec<Vector3<f64>>>,
+    /// Name, components and values of each field; patches in the order of their corners, the components of one together.
+    pub arrays: Vec<(&'static str, usize, Vec<f64>)>,
+}
+
+/// The measurements of a scene whose surface has the given shape, each with the name of its folder.
 #[must_use]
-pub fn measurements(scene: &Scene) -> Vec<(String, Box<dyn Measurement>)> {
+pub fn measurements(scene: &Scene, shape: &SurfaceShape) -> Vec<(String, Box<dyn Measurement>)> {
     let of = |measure: &Measure| -> Box<dyn Measurement> {
         match measure {
             Measure::Flow(flow) => Box::new(Flow::new(flow, scene)),
             Measure::SurfaceEnergy(energy) => Box::new(EnergyInTime::new(energy, scene)),
             Measure::Subsurface(subsurface) => Box::new(Subsurface::new(subsurface, scene)),
             Measure::Ejecta(ejecta) => Box::new(Ejecta::new(ejecta, scene)),
+            Measure::SurfaceStress(stress) => Box::new(SurfaceStress::new(stress, scene, shape)),
+            Measure::Outflow(outflow) => Box::new(Outflow::new(outflow, scene)),
         }
     };
     scene.measure_names().into_iter().zip(scene.measure.iter().map(of)).collect()

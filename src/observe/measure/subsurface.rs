@@ -268,6 +268,7 @@ impl Measurement for Subsurface {
             tables: vec![self.table(&cells), self.history(&cells), self.totals()],
             pictures: self.pictures(&cells),
             fields: Some(fields(self.grid, &cells)),
+            ..Results::default()
         }
     }
 }

@@ -11,6 +11,7 @@ use crate::scene::{Run, Span};
 /// let window = impinge::observe::measure::Window { from: 1.0, until: 3.0, batches: 4 };
 /// assert_eq!([0.9, 1.0, 1.6, 3.0, 3.1].map(|time| window.batch(time)), [None, Some(0), Some(1), Some(3), None]);
 /// assert_eq!(window.batch_length(), 0.5);
+/// assert_eq!([1.4, 1.5, 3.0].map(|time| window.is_over(0, time)), [false, true, true]);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Window {
@@ -36,6 +37,14 @@ impl Window {
         let inside = (self.from..=self.until).contains(&time);
         // The end belongs to the last batch.
         inside.then(|| (((time - self.from) / self.batch_length()) as usize).min(self.batches - 1))
+    }
+
+    /// Whether all of a batch is over at a moment (s): what is counted per time counts no batch that a run was broken off in.
+    #[must_use]
+    pub fn is_over(&self, batch: usize, time: f64) -> bool {
+        // The end of the last batch may be off the end of the run by the rounding of both.
+        const ROUNDING: f64 = 1e-9;
+        time >= self.from + (batch as f64 + 1.0 - ROUNDING) * self.batch_length()
     }
 
     /// Duration of a batch, s.

@@ -10,8 +10,8 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
 use super::{
-    Area, BLUE, Drawn, FAINT, FINE, FRAME, GREEN, HEADING, INK, MUTED, ORANGE, PURPLE, SKY, colour_bar, colour_of,
-    fine, part, picture, style, tick, write,
+    Area, BLUE, Drawn, FAINT, FINE, FRAME, GREEN, HEADING, INK, MUTED, ORANGE, PURPLE, Palette, SKY, colour_bar, fine,
+    part, picture, style, tick, write,
 };
 use crate::shown::{Axis, Line, Map, Mark, Picture, Scale};
 
@@ -19,8 +19,11 @@ use crate::shown::{Axis, Line, Map, Mark, Picture, Scale};
 const CHART: [i32; 2] = [900, 520];
 /// Where the key begins, right of the curves, pixels.
 const KEY: i32 = 650;
-/// Side of a map, pixels.
+/// Longer side of a map, pixels, and least height of its picture, for the bar of colours beside it.
 const MAP: i32 = 440;
+const MAP_LEAST: i32 = 300;
+/// A map over lengths whose sides differ by more than this is not drawn to scale: it would be a line.
+const LONGEST: f64 = 8.0;
 /// Room for the labels left of and below a picture, pixels.
 const LABELS: [i32; 2] = [66, 44];
 const COLOURS: [RGBColor; 8] =
@@ -40,13 +43,14 @@ pub fn drawn(of: &Picture) -> io::Result<String> {
     match of {
         Picture::Chart(chart) => picture(CHART, &chart.title, &chart.shows, |area| {
             let plane = part(area, [10, HEADING, KEY - 20, CHART[1] - HEADING - 10]);
-            let mut plane = axes(&plane, &chart.x, &chart.y, true)?;
+            let mut plane = axes(&plane, [&chart.x, &chart.y], [8, 8], true)?;
             chart.lines.iter().try_for_each(|line| draw_line(&mut plane, line, &chart.y))?;
             draw_key(area, &chart.lines)
         }),
         Picture::Map(map) => {
-            let size = [LABELS[0] + MAP + 230, HEADING + MAP + LABELS[1] + 30];
-            picture(size, &map.title, &map.shows, |area| draw_map(area, map))
+            let [width, height] = sides(map);
+            let size = [LABELS[0] + width + 230, HEADING + height.max(MAP_LEAST) + LABELS[1] + 30];
+            picture(size, &map.title, &map.shows, |area| draw_map(area, map, [width, height]))
         }
     }
 }
@@ -91,8 +95,8 @@ impl Ranged for Coordinate {
     }
 }
 
-/// The axes of a picture; with `lines` across it.
-fn axes<'a>(area: &Area<'a>, x: &Axis, y: &Axis, lines: bool) -> Drawn<Plane<'a>> {
+/// The axes of a picture, with about so many labels each; with `lines` across it.
+fn axes<'a>(area: &Area<'a>, [x, y]: [&Axis; 2], labels: [usize; 2], lines: bool) -> Drawn<Plane<'a>> {
     let mut plane = ChartBuilder::on(area)
         .set_label_area_size(LabelAreaPosition::Left, fine(LABELS[0]))
         .set_label_area_size(LabelAreaPosition::Bottom, fine(LABELS[1]))
@@ -108,8 +112,8 @@ fn axes<'a>(area: &Area<'a>, x: &Axis, y: &Axis, lines: bool) -> Drawn<Plane<'a>
         .label_style(style(12, INK, (HPos::Left, VPos::Top)))
         .axis_desc_style(style(13, INK, (HPos::Left, VPos::Top)))
         .set_all_tick_mark_size(fine(4))
-        .x_labels(8)
-        .y_labels(8)
+        .x_labels(labels[0])
+        .y_labels(labels[1])
         .x_label_formatter(&|value| tick(*value))
         .y_label_formatter(&|value| tick(*value))
         .x_desc(&x.label)
@@ -182,13 +186,31 @@ fn draw_key(area: &Area<'_>, lines: &[Line]) -> Drawn {
 /// So far does a cell of a map reach, in cells: the next one is drawn over what is too much, and no seam is left between them.
 const REACH: f64 = 1.2;
 
-fn draw_map(area: &Area<'_>, map: &Map) -> Drawn {
-    let mut plane =
-        axes(&part(area, [10, HEADING, LABELS[0] + MAP + 12, MAP + LABELS[1] + 10]), &map.x, &map.y, false)?;
+/// Width and height of a map, pixels: to scale where both are lengths.
+fn sides(map: &Map) -> [i32; 2] {
+    let [width, height] = [&map.x, &map.y].map(|axis| axis.range[1] - axis.range[0]);
+    let ratio = height / width;
+    if !(map.x.is_length && map.y.is_length && (LONGEST.recip()..=LONGEST).contains(&ratio)) {
+        return [MAP, MAP];
+    }
+    let shorter = |ratio: f64| (f64::from(MAP) * ratio).round() as i32;
+    if ratio < 1.0 { [MAP, shorter(ratio)] } else { [shorter(ratio.recip()), MAP] }
+}
+
+fn draw_map(area: &Area<'_>, map: &Map, [width, height]: [i32; 2]) -> Drawn {
+    // So many pixels does a label need.
+    let labels = [width / 55, height / 40].map(|count| count.clamp(2, 8) as usize);
+    let place = part(area, [10, HEADING, LABELS[0] + width + 12, height + LABELS[1] + 10]);
+    let mut plane = axes(&place, [&map.x, &map.y], labels, false)?;
     let at = |axis: &Axis, index: f64, count: usize| {
         axis.range[0] + (axis.range[1] - axis.range[0]) * (index / count as f64).min(1.0)
     };
-    let shade = |value: &Option<f64>| value.map(|value| (value / map.most * SHADES).round().min(SHADES) as u32);
+    let is_signed = map.columns.iter().flatten().flatten().any(|&value| value < 0.0);
+    let palette = if is_signed { Palette::Diverging(map.most) } else { Palette::Bright(map.most) };
+    let [low, high] = palette.range();
+    let shade = |value: &Option<f64>| {
+        value.map(|value| ((value - low) / (high - low) * SHADES).round().clamp(0.0, SHADES) as u32)
+    };
     for (column, values) in map.columns.iter().enumerate() {
         let [left, right] = [column as f64, column as f64 + REACH].map(|index| at(&map.x, index, map.columns.len()));
         let mut row = 0;
@@ -196,11 +218,11 @@ fn draw_map(area: &Area<'_>, map: &Map) -> Drawn {
             let end = row + run.len();
             let [bottom, top] = [row as f64, end as f64 + REACH - 1.0].map(|index| at(&map.y, index, values.len()));
             row = end;
-            let colour = shade(&run[0]).map_or(GREY, |shade| colour_of(f64::from(shade) / SHADES));
+            let colour = shade(&run[0]).map_or(GREY, |shade| palette.colour(f64::from(shade) / SHADES));
             plane.draw_series([Rectangle::new([(left, bottom), (right, top)], colour.filled())])?;
         }
     }
-    let key = LABELS[0] + MAP + 50;
+    let key = LABELS[0] + width + 50;
     if let Some((name, points)) = &map.line {
         plane.draw_series(LineSeries::new(points.iter().copied(), ORANGE.stroke_width(fine(2))))?;
         let ends = [(key * FINE, (HEADING + 290) * FINE), ((key + 16) * FINE, (HEADING + 290) * FINE)];
@@ -212,7 +234,7 @@ fn draw_map(area: &Area<'_>, map: &Map) -> Drawn {
         area.draw(&Rectangle::new(corners, GREY.filled()))?;
         write(area, &map.grey, [key + 24, HEADING + 320], 13, MUTED, (HPos::Left, VPos::Center))?;
     }
-    colour_bar(area, [key, HEADING + 44, 16, 210], map.most, &map.legend)
+    colour_bar(area, [key, HEADING + 44, 16, 210], palette, &map.legend)
 }
 
 #[cfg(test)]
@@ -266,5 +288,33 @@ mod tests {
         // The two grey cells are one, and so is that of the key.
         assert_eq!((svg.matches(grey).count(), svg.contains("never ends")), (2, true));
         assert!(!drawn(&map(vec![vec![Some(1.0)]])).unwrap().contains(grey));
+        // Where a value is below 0, the most and the least have the ends of the diverging colours.
+        let signed = drawn(&map(vec![vec![Some(4.0)], vec![Some(-4.0)]])).unwrap();
+        for end in [1.0, -1.0] {
+            let RGBColor(r, g, b) = crate::output::plots::diverging(end);
+            assert!(signed.contains(&format!("#{r:02X}{g:02X}{b:02X}")), "{end}");
+        }
+        assert!(signed.contains("-4") && !svg.contains("-4"));
+    }
+
+    #[test]
+    fn a_map_over_lengths_is_drawn_to_scale() {
+        let map = |x: Axis, y: Axis| Map {
+            name: "map",
+            title: String::new(),
+            shows: String::new(),
+            x,
+            y,
+            columns: vec![vec![Some(1.0)]],
+            legend: String::new(),
+            most: 1.0,
+            grey: String::new(),
+            line: None,
+        };
+        let length = |to| Axis::length("x / m", 1.0, 1.0 + to);
+        assert_eq!(sides(&map(length(2.0), length(1.0))), [MAP, MAP / 2]);
+        assert_eq!(sides(&map(length(1.0), length(4.0))), [MAP / 4, MAP]);
+        assert_eq!(sides(&map(length(1.0), length(100.0))), [MAP, MAP], "a line");
+        assert_eq!(sides(&map(length(2.0), Axis::linear("angle", 0.0, 1.0))), [MAP, MAP]);
     }
 }

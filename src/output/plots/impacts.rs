@@ -5,7 +5,7 @@ use std::io;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
-use super::{Area, Drawn, HEADING, INK, colour_bar, colour_of, fine, part, picture, style, tick};
+use super::{Area, Drawn, HEADING, INK, Palette, colour_bar, colour_of, fine, part, picture, style, tick};
 use crate::observe::{PlaneMap, SurfaceMap};
 use crate::output::summary::{Prefix, brief};
 
@@ -38,7 +38,7 @@ pub fn impacts(title: &str, map: &SurfaceMap) -> io::Result<Option<String>> {
         squares.draw(&part(root, [10, HEADING + 10, LABELS[0] + width, height + LABELS[1]]))?;
         let prefix = Prefix::of(squares.most());
         let bar = [LABELS[0] + width + 40, HEADING + 40, 16, (height - 50).clamp(120, 300)];
-        colour_bar(root, bar, squares.most() / prefix.factor, &format!("{}J/m²", prefix.symbol))
+        colour_bar(root, bar, Palette::Bright(squares.most() / prefix.factor), &format!("{}J/m²", prefix.symbol))
     })
     .map(Some)
 }

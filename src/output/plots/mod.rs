@@ -117,19 +117,55 @@ fn colour_of(value: f64) -> RGBColor {
     RGBColor(r, g, b)
 }
 
+/// The colour of `value` in -1..1: white is 0, red is above, blue is below.
+fn diverging(value: f64) -> RGBColor {
+    let colorous::Color { r, g, b } = colorous::RED_BLUE.eval_continuous(0.5 - 0.5 * value.clamp(-1.0, 1.0));
+    RGBColor(r, g, b)
+}
+
+/// Which colours stand for numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Palette {
+    /// From dark at 0 to bright at this number.
+    Bright(f64),
+    /// From blue at less than 0 by this number to red at more than 0 by it.
+    Diverging(f64),
+}
+
+impl Palette {
+    /// From where to where it reaches.
+    fn range(self) -> [f64; 2] {
+        match self {
+            Self::Bright(most) => [0.0, most],
+            Self::Diverging(most) => [-most, most],
+        }
+    }
+
+    /// The colour of a part of the range, 0 to 1.
+    fn colour(self, part: f64) -> RGBColor {
+        match self {
+            Self::Bright(_) => colour_of(part),
+            Self::Diverging(_) => diverging(2.0 * part - 1.0),
+        }
+    }
+}
+
 /// A colour bar in a rectangle (pixels: left, top, width, height), with its numbers on the right and its label above.
-fn colour_bar(area: &Area<'_>, [left, top, width, height]: [i32; 4], most: f64, label: &str) -> Drawn {
+fn colour_bar(area: &Area<'_>, [left, top, width, height]: [i32; 4], palette: Palette, label: &str) -> Drawn {
     const SHADES: i32 = 64;
     for shade in 0..SHADES {
         let level = |step: i32| (top + height) * FINE - height * FINE * step / SHADES;
-        let colour = colour_of((f64::from(shade) + 0.5) / f64::from(SHADES));
+        let colour = palette.colour((f64::from(shade) + 0.5) / f64::from(SHADES));
         area.draw(&Rectangle::new(
             [(left * FINE, level(SHADES)), ((left + width) * FINE, level(shade))], // up to the end: no seams
             colour.filled(),
         ))?;
     }
-    for value in ticks(most, 5) {
-        let y = (top + height) * FINE - (f64::from(height * FINE) * value / most).round() as i32;
+    let [low, high] = palette.range();
+    let upwards = ticks(high, if low < 0.0 { 3 } else { 5 });
+    let downwards = upwards.iter().filter(|&&value| low < 0.0 && value > 0.0).map(|value| -value);
+    for value in downwards.chain(upwards.iter().copied()) {
+        let y = (top + height) * FINE - (f64::from(height * FINE) * (value - low) / (high - low)).round() as i32;
         let right = (left + width) * FINE;
         area.draw(&PathElement::new([(right, y), (right + 4 * FINE, y)], INK.stroke_width(FINE as u32)))?;
         area.draw_text(&tick(value), &style(12, INK, (HPos::Left, VPos::Center)), (right + 8 * FINE, y))?;

@@ -8,7 +8,9 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
 use super::raster::{Block, Raster};
-use super::{Area, Drawn, FINE, FRAME, HEADING, INK, colour_bar, colour_of, fine, part, picture, style, tick, write};
+use super::{
+    Area, Drawn, FINE, FRAME, HEADING, INK, Palette, colour_bar, colour_of, fine, part, picture, style, tick, write,
+};
 use crate::grains::Snapshot;
 use crate::observe::SurfaceShape;
 use crate::output::summary::{Prefix, brief};
@@ -179,7 +181,7 @@ impl View {
         let prefix = Prefix::of(self.fastest);
         let bar = [self.size()[0] - BAR, HEADING + CAPTION + 20, 16, (self.panel[1] - 20).clamp(120, 320)];
         let most = if self.fastest > 0.0 { self.fastest / prefix.factor } else { 1.0 };
-        colour_bar(area, bar, most, &format!("speed ({}m/s)", prefix.symbol))
+        colour_bar(area, bar, Palette::Bright(most), &format!("speed ({}m/s)", prefix.symbol))
     }
 
     fn draw_panel(&self, area: &Area<'_>, index: usize, lowest: bool, still: &Still, surface: &Surface) -> Drawn {
