@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::limits::{Checked, positive};
 use super::outflow::{self, OutflowMeasure};
 use super::surface_stress::{self, SurfaceStressMeasure};
-use super::{Invalid, PlaneSurface, Run, Scene, Surface, Vec3};
+use super::{Invalid, Run, Scene, Surface, Vec3};
 
 /// Most cells of a grid times batches: each holds eighteen numbers, so that these fill 2 GB. More is a misplaced digit.
 pub(super) const CELLS_MAX: u64 = 14_000_000;
@@ -104,12 +104,17 @@ pub struct SurfaceEnergyMeasure {
     pub batches: u32,
 }
 
-/// `kind = "subsurface"`: the first plane at rest bounds an elastic solid; each hit is a force on a point of it.
+/// `kind = "subsurface"`: a plane bounds an elastic solid, and each hit on it is a force on a point of it. Hits on triangles that lie in the plane count
+/// too.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct SubsurfaceMeasure {
     /// Name of its folder; left out, its kind.
     pub name: Option<String>,
+    /// A point of the plane, m; left out, that of the first plane of the scene that is at rest.
+    pub point: Option<Vec3>,
+    /// Normal of the plane, away from the solid, with `point`; any length but 0.
+    pub normal: Option<Vec3>,
     /// Lower corner of the grid, m; all of it must be below the plane.
     pub min: Vec3,
     /// Upper corner of the grid, m.
@@ -152,6 +157,16 @@ pub struct SubsurfaceMeasure {
 impl SubsurfaceMeasure {
     /// Poisson's ratio of solids and grains where the scene gives none: that of steel.
     pub const POISSON_RATIO: f64 = 0.3;
+
+    /// Point (m) and normal of the plane: its own, or those of the first plane of the scene that is at rest.
+    #[must_use]
+    pub fn plane(&self, scene: &Scene) -> Option<[Vec3; 2]> {
+        let at_rest = |surface: &Surface| match surface {
+            Surface::Plane(plane) if plane.velocity == [0.0; 3] => Some([plane.point, plane.normal]),
+            _ => None,
+        };
+        self.point.zip(self.normal).map(Into::into).or_else(|| scene.surface.iter().find_map(at_rest))
+    }
 }
 
 fn default_poisson_ratio() -> f64 {
@@ -254,17 +269,6 @@ impl Scene {
     }
 }
 
-impl Scene {
-    /// The first plane that does not move.
-    #[must_use]
-    pub fn plane_at_rest(&self) -> Option<&PlaneSurface> {
-        self.surface.iter().find_map(|surface| match surface {
-            Surface::Plane(plane) if plane.velocity == [0.0; 3] => Some(plane),
-            _ => None,
-        })
-    }
-}
-
 /// Validates all measurements.
 pub(super) fn check(scene: &Scene) -> Checked {
     let names = scene.measure_names();
@@ -361,16 +365,26 @@ fn check_grid(
 }
 
 fn check_subsurface(key: &impl Fn(&str) -> String, measure: &SubsurfaceMeasure, scene: &Scene) -> Checked {
-    let Some(plane) = scene.plane_at_rest() else {
-        let remedy = "add a [[surface]] with `kind = \"plane\"` and no velocity, or take the measurement out";
+    for (given, missing, name) in [(measure.point, measure.normal, "normal"), (measure.normal, measure.point, "point")]
+    {
+        if given.is_some() && missing.is_none() {
+            let what = format!("there is no `{name}` of the plane");
+            return Err(Invalid::new(key(name), what, "give both `point` and `normal`, or neither"));
+        }
+    }
+    let Some([point, normal]) = measure.plane(scene) else {
+        let remedy = "give `point` and `normal` of the plane, or add a [[surface]] with `kind = \"plane\"`";
         return Err(Invalid::new(key("kind"), "there is no plane at rest that bounds a solid", remedy));
     };
+    let length = normal.iter().map(|part| part * part).sum::<f64>().sqrt();
+    if length == 0.0 {
+        return Err(Invalid::new(key("normal"), "it has no direction", "give a vector that is not 0"));
+    }
     check_grid(key, Some(measure.min), Some(measure.max), measure.cells, measure.batches, scene)?;
     let corners = (0..8).map(|corner| -> Vec3 {
         std::array::from_fn(|axis| if corner >> axis & 1 == 0 { measure.min[axis] } else { measure.max[axis] })
     });
-    let length = plane.normal.iter().map(|part| part * part).sum::<f64>().sqrt();
-    let height = |corner: Vec3| (0..3).map(|i| (corner[i] - plane.point[i]) * plane.normal[i]).sum::<f64>() / length;
+    let height = |corner: Vec3| (0..3).map(|i| (corner[i] - point[i]) * normal[i]).sum::<f64>() / length;
     let highest = corners.map(height).fold(f64::NEG_INFINITY, f64::max);
     let size = (0..3).map(|axis| measure.max[axis] - measure.min[axis]).fold(0.0, f64::max);
     if highest > ROUNDING * size {

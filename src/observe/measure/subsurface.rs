@@ -145,10 +145,10 @@ impl Subsurface {
     /// The measurement that a scene asks for.
     ///
     /// # Panics
-    /// If the scene has no plane at rest, which its checks would have refused.
+    /// If there is no plane, which its checks would have refused.
     #[must_use]
     pub fn new(measure: &SubsurfaceMeasure, scene: &Scene) -> Self {
-        let plane = scene.plane_at_rest().expect("a scene that was checked has a plane");
+        let plane = measure.plane(scene).expect("a scene that was checked has a plane");
         let dense = Elastic::from_young(measure.young_modulus, measure.poisson_ratio);
         let solid = match measure.porosity {
             0.0 => dense,
@@ -160,7 +160,8 @@ impl Subsurface {
             ContactTime::Fixed(time) => Contact::Lasting(time),
             ContactTime::Elastic(crate::scene::Elastic::Hertz) => Contact::hertz(&solid, grain.as_ref()),
         };
-        let (point, normal) = (Vector3::from(plane.point), Vector3::from(plane.normal).normalize());
+        let [point, normal] = plane.map(Vector3::from);
+        let normal = normal.normalize();
         let grid = Grid { min: measure.min, max: measure.max, cells: measure.cells };
         let window = Window::new(crate::scene::Measure::Subsurface(measure.clone()).span(), &scene.run);
         Self::over(grid, window, HalfSpace { point, normal, solid, threshold: measure.threshold, contact })
@@ -536,6 +537,51 @@ mod tests {
             }
             approx::assert_relative_eq!(cell.peak, peak, max_relative = 1e-13);
             assert_eq!(cell.damage, damage);
+        }
+    }
+
+    /// 50 grains that do not see each other, on a surface.
+    fn rain_on(surface: &str) -> Vec<DamageCell> {
+        let text = format!(
+            r#"
+            run = {{ until = 0.05, interference = "none" }}
+            domain = {{ min = [-1, -1, -1], max = [1, 1, 5] }}
+            grain = {{ radius = 0.01, density = 8500 }}
+            contact.surface = {{ restitution = 0.8, friction = 0.4 }}
+            source = [{{ kind = "block", min = [-0.1, -0.1, 0.1], max = [0.1, 0.1, 1], count = 50, velocity = [20, 0, -80] }}]
+            surface = [{surface}]
+            [[measure]]
+            kind = "subsurface"
+            point = [0, 0, 0]
+            normal = [0, 0, 3]
+            min = [-0.3, -0.3, -0.1]
+            max = [0.3, 0.3, 0]
+            cells = [12, 12, 4]
+            young_modulus = 1.2e11
+            porosity = 0.2
+            threshold = 3e7
+            "#
+        );
+        let scene: Scene = toml::from_str(&text).expect("a scene");
+        crate::scene::check(&scene).expect("it is valid");
+        let crate::scene::Measure::Subsurface(measure) = &scene.measure[0] else { panic!("its kind") };
+        let mut seen = Subsurface::new(measure, &scene);
+        let mut simulation = crate::simulation::Simulation::new(&scene, "".as_ref()).expect("it is prepared");
+        simulation.run(&mut seen, &mut |_| std::ops::ControlFlow::Continue(())).expect("it runs");
+        assert_eq!(seen.batches.iter().map(|batch| batch.hits).sum::<u64>(), 50);
+        seen.cells()
+    }
+
+    #[test]
+    fn a_mesh_of_a_plane_is_the_plane() {
+        let plane = rain_on(r#"{ kind = "plane", point = [0, 0, 0], normal = [0, 0, 1] }"#);
+        let mesh = rain_on(
+            r#"{ kind = "rectangle", centre = [0, 0, 0], normal = [0, 0, 1], along = [1, 0, 0], size = [2, 2], divisions = [7, 5] }"#,
+        );
+        assert!(plane.iter().any(|cell| cell.total().value > 1.0));
+        for (one, other) in plane.iter().zip(&mesh) {
+            approx::assert_relative_eq!(one.peak, other.peak, max_relative = 1e-9);
+            assert_eq!(one.damage, other.damage);
         }
     }
 

@@ -3,7 +3,7 @@
 use super::{Measurement, Results, Window};
 use crate::estimate::Estimate;
 use crate::grains::{Grain, Snapshot};
-use crate::observe::{Ledger, OrderTally, SurfaceEnergy};
+use crate::observe::{Ledger, OrderTally, Sum, SurfaceEnergy};
 use crate::scene::{Scene, SurfaceEnergyMeasure};
 use crate::scheme::{GrainCollision, Kick, Observer, Passage, Rest, SurfaceHit};
 use crate::shown::{Axis, Chart, Line, Mark, Picture, Table};
@@ -74,7 +74,7 @@ impl EnergyInTime {
 
 /// Energy along the normal, along the surface and in rotation (J) of all orders.
 fn parts(energy: &SurfaceEnergy) -> [f64; 3] {
-    let sum = |of: fn(&OrderTally) -> f64| energy.by_order().iter().map(of).sum();
+    let sum = |of: fn(&OrderTally) -> f64| energy.by_order().iter().map(of).collect::<Sum>().value();
     [sum(|tally| tally.normal.value()), sum(|tally| tally.tangential.value()), sum(|tally| tally.spin.value())]
 }
 
@@ -143,7 +143,7 @@ impl EnergyInTime {
         let most = self.batches.iter().map(|batch| batch.by_order().len()).max().unwrap_or(0);
         for order in 0..most {
             let tallies = || self.batches.iter().filter_map(|batch| batch.by_order().get(order));
-            let sum = |of: fn(&OrderTally) -> f64| tallies().map(of).sum::<f64>();
+            let sum = |of: fn(&OrderTally) -> f64| tallies().map(of).collect::<Sum>().value();
             let hits: u64 = tallies().map(|tally| tally.hits).sum();
             table.row(&[
                 &(order + 1),

@@ -240,13 +240,18 @@ fn history(points: &[Point]) -> Table {
 }
 
 fn over_restitution(points: &[Point], plan: &[Plan]) -> Chart {
-    let line = |(index, (grains, friction, ..)): (usize, &Plan)| {
+    let line = |(grains, friction, ..): &Plan| {
         let of = points.iter().filter(|point| (point.jet.grains, point.jet.friction) == (*grains, *friction));
         let points = of.map(|point| (point.jet.restitution, point.alpha())).collect();
         let mark = if *grains < 10_000 { Mark::OpenPoints } else { Mark::Points };
-        Line { name: format!("{grains} grains, mu = {friction}"), points, mark, colour: index % 3 }
+        Line {
+            name: format!("{grains} grains, mu = {friction}"),
+            points,
+            mark,
+            colour: (friction / 0.2).round() as usize,
+        }
     };
-    let mut lines: Vec<Line> = plan.iter().enumerate().map(line).collect();
+    let mut lines: Vec<Line> = plan.iter().map(line).collect();
     lines.push(Line::curve("as without interference", 0, Mark::Guide, [(0.0, 0.0), (1.0, 0.0)]));
     Chart {
         name: "alpha",

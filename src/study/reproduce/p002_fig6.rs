@@ -275,9 +275,9 @@ fn pictures(seen: &[Seens]) -> Vec<Picture> {
     let mut pictures = Vec::new();
     for (grains, names) in [FEW, MANY].into_iter().zip(NAMES) {
         let Some(at) = seen.iter().find(|at| at.jet.grains == grains) else { continue };
-        // The jet itself is as bright as can be, and so is what has a twentieth of it.
+        // The jet itself is as bright as can be, and so is what has a quarter of it.
         let flow = grains as f64 / (at.jet.width * at.jet.length);
-        let view = View { x: [-1.5, 1.5], z: [0.0, 3.0], cells: [100, 100], most: flow / 20.0 };
+        let view = View { x: [-1.5, 1.5], z: [0.0, 3.0], cells: [60, 60], most: flow / 4.0 };
         for (frame, name) in DRAWN.into_iter().zip(names) {
             let copies: Vec<&[Seen]> = at.copies.iter().map(|stills| stills.0[frame].1.as_slice()).collect();
             let time = 1e3 * at.copies[0].0[frame].0;

@@ -488,7 +488,7 @@ fn pictures(copies: &[Copies]) -> Vec<Picture> {
     });
     let views = ["jet_0deg", "jet_30deg", "jet_60deg"].into_iter().zip(copies).map(|(name, at)| {
         let flow = at.jet.grains as f64 / (at.jet.width * at.jet.length);
-        let view = View { x: [-1.5, 1.5], z: [-1.0, 2.0], cells: [100, 100], most: flow / 20.0 };
+        let view = View { x: [-1.5, 1.5], z: [-1.0, 2.0], cells: [60, 60], most: flow / 4.0 };
         let stills: Vec<&[Seen]> = at.outcomes.iter().map(|outcome| outcome.still.as_slice()).collect();
         let title = format!("A jet of {} grains at {}° after 30 ms, from the side", at.jet.grains, at.jet.angle);
         let shows = format!("Mean of {} jets; Mukherjee & Zohdi (2015), fig. 11", stills.len());
