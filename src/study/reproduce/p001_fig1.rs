@@ -30,9 +30,9 @@ const REACHED: f64 = 3.0;
 const EXPONENT: f64 = 0.15;
 /// An exponential may miss what it is fitted to by this part and still be called one.
 const CLOSE: f64 = 0.2;
-/// A straight line over the targets on which the cone is open may miss the angle by so much (root mean square) and still be called one, degrees: a
-/// tenth of the change of an ideal jet.
-const STRAIGHT: f64 = 3.5;
+/// A straight line over the targets on which the cone is open may miss the angle by so much (root mean square) and still be called one, degrees: it
+/// misses the angle of an ideal jet by 1.6, and a square that reaches 60 degrees by 3.
+const STRAIGHT: f64 = 2.0;
 /// An angle as near to that of an ideal jet follows it, degrees. For grains of finite size a target is wider by about a grain than it is, which is worth
 /// two degrees at 12 grains a width.
 const IDEAL: f64 = 4.0;
