@@ -1,7 +1,7 @@
 //! Paper 001, figures 1 and 6: how a jet opens on targets of different sizes.
 
 use super::target_jet::{
-    DEVIATIONS, Fit, Spray, Stream, TargetJet, all, decide, ideal_angle, is_above, rise, rises, run_sprays,
+    DEVIATIONS, Fit, Spray, Stream, TargetJet, all, decide, ideal_angle, is_above, note_set_up, rise, rises, run_sprays,
 };
 use super::{Error, Report, Settings, Study};
 use crate::estimate::{Estimate, Slope};
@@ -47,6 +47,7 @@ fn compute(settings: &Settings<'_>) -> Result<Report, Error> {
     let (packed, loose) = sprays.split_at(targets.len());
     let [packed, loose] = [packed, loose].map(|sprays| sprays.iter().rev().collect::<Vec<_>>());
     let mut report = Report::default();
+    note_set_up(&mut report, &jets[0], copies);
     for (name, sprays) in [("packed", &packed), ("loose", &loose)] {
         opening(name, sprays, &mut report);
         velocity(name, sprays, &mut report);
@@ -96,8 +97,7 @@ fn opening(name: &str, sprays: &[&Spray], report: &mut Report) {
     report.put_to_the_test(
         format!("A {name} jet: below 90 degrees the angle is linear in the size, within {STRAIGHT} degrees"),
         format!(
-            "up to 2 widths the line {:.1} + {:.1} D_tar / D_jet misses it by {:.1} degrees (root mean square; errors are up to {noise:.1}); it does not \
-             go through 0",
+            "up to 2 widths the line {:.1} + {:.1} D_tar / D_jet misses it by {:.1} degrees (root mean square; errors are up to {noise:.1})",
             line.intercept, line.slope.value, line.misfit
         ),
         line.misfit < STRAIGHT,

@@ -1,6 +1,8 @@
 //! Paper 001, figure 2: sheets of fine grains, fireworks of coarse ones; and whether elastic grains make a sheet.
 
-use super::target_jet::{DIAMETER, Spray, Stream, TargetJet, all, decide, is_above, rise, rises, run_sprays};
+use super::target_jet::{
+    DIAMETER, Spray, Stream, TargetJet, all, decide, is_above, note_set_up, rise, rises, run_sprays,
+};
 use super::{Error, Report, Settings, Study};
 use crate::estimate::Estimate;
 use crate::shown::{Axis, Chart, Line, Picture, Table};
@@ -63,6 +65,7 @@ fn compute(settings: &Settings<'_>) -> Result<Report, Error> {
         these
     });
     let mut report = Report::default();
+    note_set_up(&mut report, &jets[0], copies);
     let [reference, softer, harder, elastic, round] = series;
     grain_size("A planar jet", reference, &mut report);
     grain_size("A round jet in space", round, &mut report);

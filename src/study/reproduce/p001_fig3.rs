@@ -1,7 +1,7 @@
 //! Paper 001, figures 3 to 5: the stress over targets of three sizes.
 
 use super::ensemble::run_observed;
-use super::target_jet::{DIAMETER, Fit, TargetJet, all, copies, decide, is_above, length, rise};
+use super::target_jet::{DIAMETER, Fit, TargetJet, all, copies, decide, is_above, length, note_set_up, rise};
 use super::{Error, Report, Settings, Study};
 use crate::estimate::Estimate;
 use crate::observe::measure::{Flow, Grid};
@@ -148,6 +148,7 @@ fn compute(settings: &Settings<'_>) -> Result<Report, Error> {
     let gather = |(jet, copies): (&TargetJet, &[Profile])| Over { jet: *jet, copies: copies.to_vec() };
     let over: Vec<Over> = jets.iter().zip(all.chunks(count as usize)).map(gather).collect();
     let mut report = Report::default();
+    note_set_up(&mut report, &jets[0], count);
     exponential(&over, &mut report);
     one_constant(&over, &mut report);
     alike(&over, &mut report);

@@ -1,7 +1,7 @@
 //! Paper 001, figures 7 and 8: overlaps of soft spheres, and where grains are dense, over targets of three sizes.
 
 use super::ensemble::run_observed;
-use super::target_jet::{DIAMETER, TargetJet, all, copies, decide, is_above, length, rise, rises};
+use super::target_jet::{DIAMETER, TargetJet, all, copies, decide, is_above, length, note_set_up, rise, rises};
 use super::{Error, Report, Settings, Study};
 use crate::estimate::Estimate;
 use crate::grains::Snapshot;
@@ -247,6 +247,7 @@ fn compute(settings: &Settings<'_>) -> Result<Report, Error> {
     let gather = |(jet, copies): (&TargetJet, &[Run])| Over { jet: *jet, copies: copies.to_vec() };
     let over: Vec<Over> = jets.iter().zip(all.chunks(count as usize)).map(gather).collect();
     let mut report = Report::default();
+    note_set_up(&mut report, &jets[0], count);
     overlaps(&over, &mut report);
     zones(&over, &mut report);
     areas(&over, &mut report);
@@ -349,7 +350,7 @@ fn areas(over: &[Over], report: &mut Report) {
     );
     report.measured(
         format!("Area with a volume fraction above {PRINTED_DENSE}, as printed"),
-        format!("{}: hardly any; circles at rest fill 0.82 to 0.84, a crystal 0.907", told(&printed)),
+        format!("{}; circles at random fill 0.82 to 0.84 at most, a crystal 0.907", told(&printed)),
     );
     let link = series(&|run| run.link);
     // As above: less and more than half as dense as the jet.

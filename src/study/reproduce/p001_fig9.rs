@@ -147,6 +147,16 @@ fn compute(settings: &Settings<'_>) -> Result<Report, Error> {
     let all: Vec<Copies> = jets.iter().zip(all.chunks(count as usize)).map(gather).collect();
     let (by_distance, others) = all.split_at(distances.len());
     let mut report = Report::default();
+    report.measured(
+        "What was run",
+        format!(
+            "two planar jets {across} grains of {} mm wide, area fraction {LOOSE} at random, from nozzles at {SPEED} m/s, restitution {} and friction {}, no \
+             gravity; event-driven, {count} copies",
+            1e3 * DIAMETER,
+            reference.restitution,
+            reference.friction
+        ),
+    );
     distance(by_distance, &mut report);
     if let (Some(reference), [coarse, elastic]) =
         (by_distance.iter().find(|copies| copies.jets.distance == reference.distance), others)

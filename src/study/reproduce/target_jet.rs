@@ -254,6 +254,27 @@ pub(super) fn ideal_angle(target: f64) -> f64 {
     low.to_degrees()
 }
 
+/// Notes what was run, as far as all copies have it in common: the papers give few absolute numbers.
+pub(super) fn note_set_up(report: &mut Report, jet: &TargetJet, copies: u64) {
+    let grains = match jet.stream {
+        Stream::Packed => format!("planar, area fraction {PACKED} in a hexagonal lattice, {DISORDER} U_0 of disorder"),
+        Stream::Loose => format!("planar, area fraction {LOOSE} at random"),
+        Stream::Round => format!("round, volume fraction {ROUND} at random"),
+    };
+    report.measured(
+        "What was run",
+        format!(
+            "jets {:.1} grains wide of {} mm at U_0 = {SPEED} m/s ({grains}; variants are named where they come), restitution {} and friction {} of grains \
+             and target, no gravity; scheme {}, {copies} copies; nothing but ratios of lengths, restitution and friction matters to hard grains",
+            jet.width() / DIAMETER,
+            1e3 * DIAMETER,
+            jet.restitution,
+            jet.friction,
+            jet.scheme.name(),
+        ),
+    );
+}
+
 /// Whether an estimate is above a bound: unknown where it is too uncertain.
 pub(super) fn is_above(estimate: Estimate, bound: f64) -> Option<bool> {
     let distance = (estimate.value - bound) / estimate.error;
