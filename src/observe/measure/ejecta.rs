@@ -1,15 +1,14 @@
 //! Where grains fly to that have hit what they hit (Huang, Chan & Zamankhan 2010, section III).
 
+use impinge_events::Flight;
 use nalgebra::Vector3;
 
 use super::{Measurement, Results, Window};
 use crate::estimate::Estimate;
+use crate::grains::{Grain, Snapshot};
 use crate::scene::{EjectaMeasure, Scene};
 use crate::scheme::{Observer, Passage};
 use crate::shown::{Axis, Chart, Line, Mark, Picture, Table};
-use impinge_events::Flight;
-
-use crate::grains::Grain;
 
 /// The directions in which mass leaves the domain, as angles from the direction of the jet: 0 goes straight on, 90° is a sheet across the jet, 180° goes
 /// straight back.
@@ -205,7 +204,7 @@ impl Observer for Ejecta {
         self.batches[batch].push(Left { mass: grain.mass, angle: across.atan2(along), along, across });
     }
 
-    fn sample(&mut self, snapshot: &crate::grains::Snapshot<'_>) {
+    fn sample(&mut self, snapshot: &Snapshot<'_>) {
         self.seen = snapshot.time;
     }
 }
@@ -243,8 +242,13 @@ impl Measurement for Ejecta {
             y: Axis::linear("part of the mass per degree", 0.0, 1.05 * most),
             lines: vec![
                 Line::measured("part of the mass", 0, distribution),
-                guide(&format!("opening angle {}", ejected.opening_angle), ejected.opening_angle.value, Mark::Curve, 1),
-                guide(&format!("half of it within {}", ejected.half_mass_angle), low, Mark::Dashed, 2),
+                guide(
+                    &format!("opening angle {} degrees", ejected.opening_angle),
+                    ejected.opening_angle.value,
+                    Mark::Curve,
+                    1,
+                ),
+                guide(&format!("half within {} degrees", ejected.half_mass_angle), low, Mark::Dashed, 2),
                 guide("", high, Mark::Dashed, 2),
             ],
         };
@@ -266,7 +270,7 @@ mod tests {
         let flight = Flight { position: Vector3::zeros(), time: 0.0, velocity, radius: 0.1 };
         let grain = Grain { id: 0, mass, spin: Vector3::zeros(), hits: 0, strength: 1.0 };
         ejecta.passage(Passage::Left, time, &flight, &grain);
-        ejecta.sample(&crate::grains::Snapshot { time, flights: &[], grains: &[] });
+        ejecta.sample(&Snapshot { time, flights: &[], grains: &[] });
     }
 
     #[test]

@@ -207,6 +207,10 @@ impl Flow {
         let kinetic = |batch: &Summed| batch.cell.fluctuation(&u) / (batch.samples * volume);
         let contact = |batch: &Summed| batch.cell.virial / (batch.duration * volume);
         let parts = |of: &dyn Fn(&Summed) -> Tensor| std::array::from_fn(|part| per_batch(&|batch| of(batch)[part]));
+        // Squares, of which rounding must not make less than nothing.
+        let not_below_zero = |of: Estimate| Estimate { value: of.value.max(0.0), ..of };
+        let mut kinetic_stress: [Estimate; 6] = parts(&kinetic);
+        kinetic_stress[..3].iter_mut().for_each(|part| *part = not_below_zero(*part));
         let dimensions = self.dimensions();
         let any = all.count > 0.0;
         FlowCell {
@@ -214,13 +218,10 @@ impl Flow {
             density: density(|cell| cell.mass),
             volume_fraction: density(|cell| cell.volume),
             velocity: any.then(|| [0, 1, 2].map(|axis| ratio(&|cell| cell.momentum[axis]))),
-            temperature: any.then(|| {
-                let of = ratio(&|cell| trace(&cell.fluctuation(&u)) / dimensions);
-                Estimate { value: of.value.max(0.0), ..of }
-            }),
-            kinetic_stress: parts(&kinetic),
+            temperature: any.then(|| not_below_zero(ratio(&|cell| trace(&cell.fluctuation(&u)) / dimensions))),
+            kinetic_stress,
             contact_stress: parts(&contact),
-            pressure: per_batch(&|batch| trace(&(kinetic(batch) + contact(batch))) / dimensions),
+            pressure: not_below_zero(per_batch(&|batch| trace(&(kinetic(batch) + contact(batch))) / dimensions)),
         }
     }
 
@@ -441,11 +442,12 @@ impl Flow {
             map("pressure", "Mean normal stress, kinetic and contact", "Pa", &|cell| {
                 where_grains_are(cell, cell.pressure.value)
             }),
+            // Friction may pull where few grains touch; a map shows that as nothing.
             map("contact_stress_x", "Contact stress along x", "Pa", &|cell| {
-                where_grains_are(cell, cell.contact_stress[0].value)
+                where_grains_are(cell, cell.contact_stress[0].value.max(0.0))
             }),
             map("contact_stress_z", "Contact stress along z", "Pa", &|cell| {
-                where_grains_are(cell, cell.contact_stress[2].value)
+                where_grains_are(cell, cell.contact_stress[2].value.max(0.0))
             }),
         ];
         pictures.into_iter().flatten().collect()

@@ -1,7 +1,7 @@
 //! Paper 001, figures 3 to 5: the stress over targets of three sizes.
 
 use super::ensemble::run_observed;
-use super::target_jet::{DIAMETER, Fit, TargetJet, all, copies, decide, is_above, length, rise};
+use super::target_jet::{DIAMETER, Fit, TargetJet, all, copies, decide, is_above, length, note_set_up, rise};
 use super::{Error, Report, Settings, Study};
 use crate::estimate::Estimate;
 use crate::observe::measure::{Flow, Grid};
@@ -19,8 +19,8 @@ pub(super) const STUDY: Study = Study {
 /// R* = D_tar / D_jet.
 const TARGETS: [f64; 3] = [4.0, 2.0, 1.0];
 /// Grains across the jet, and copies.
-const SIZE: (f64, u64) = (12.0, 8);
-const QUICK_SIZE: (f64, u64) = (9.0, 4);
+const SIZE: (f64, u64) = (14.0, 10);
+const QUICK_SIZE: (f64, u64) = (9.0, 8);
 /// The layer in which the stress is looked at over the radius: from 2 to 3 diameters over the target.
 const LAYER: usize = 2;
 /// An exponential may miss the stress by this part (root mean square) and still be called one; and what differs by less is alike.
@@ -37,6 +37,11 @@ const NAMES: [&str; 2] = ["radial", "axial"];
 
 /// Contact stress over ρ U² in columns from the middle of the target outwards, each from its surface up; radial and axial.
 type Profile = Vec<Vec<[f64; 2]>>;
+
+/// Stress in a column and a row.
+type At<'a> = dyn Fn(usize, usize) -> Estimate + 'a;
+/// Places and values.
+type Points = Vec<(f64, Estimate)>;
 
 /// Copies over one target.
 struct Over {
@@ -64,27 +69,23 @@ impl Over {
         (0..self.copies[0].len()).take_while(|&column| self.radius(column) < self.jet.target).count()
     }
 
-    /// A straight line through each copy of what `points` gives, weighed alike: mean slope, and that of the mean.
-    fn fitted(&self, points: &dyn Fn(&dyn Fn(usize, usize) -> Estimate) -> Vec<(f64, Estimate)>, part: usize) -> Fit {
-        let of_mean = points(&|column, row| self.mean(column, row, part));
-        let fit = Fit::of(&of_mean);
-        let slopes: Vec<f64> = self
-            .copies
-            .iter()
-            .map(|profile| {
-                let of_copy = points(&|column, row| Estimate {
-                    value: profile[column][row][part],
-                    ..self.mean(column, row, part)
-                });
-                Fit::of(&of_copy).slope.value
-            })
-            .collect();
+    /// A straight line through what `points` makes of the mean; how sure its slope is, those through what it makes of each copy tell.
+    fn fitted(&self, points: impl Fn(&At<'_>) -> Points, part: usize) -> Fit {
+        let fit = Fit::of(&points(&|column, row| self.mean(column, row, part)));
+        let of_copy = |profile: &Profile| {
+            let at = |column: usize, row: usize| Estimate {
+                value: profile[column][row][part],
+                ..self.mean(column, row, part)
+            };
+            Fit::of(&points(&at)).slope.value
+        };
+        let slopes: Vec<f64> = self.copies.iter().map(of_copy).collect();
         Fit { slope: Estimate { error: Estimate::mean(&slopes).error, ..fit.slope }, ..fit }
     }
 
     /// ln of the stress in the layer over r / R_jet.
-    fn exponential(&self, part: usize) -> (Fit, Vec<(f64, Estimate)>) {
-        let points = |at: &dyn Fn(usize, usize) -> Estimate| -> Vec<(f64, Estimate)> {
+    fn exponential(&self, part: usize) -> (Fit, Points) {
+        let points = |at: &At<'_>| -> Points {
             let ln = |column| {
                 let mean = self.mean(column, LAYER, part);
                 // All copies weigh a column by the mean there: where one of them has no stress its logarithm would be none.
@@ -93,7 +94,7 @@ impl Over {
             };
             (0..self.columns()).map(ln).collect()
         };
-        (self.fitted(&points, part), points(&|column, row| self.mean(column, row, part)))
+        (self.fitted(points, part), points(&|column, row| self.mean(column, row, part)))
     }
 
     /// The radial stress over h / R_jet in one column, over the lowest layer, part of which contacts with the target carry.
@@ -103,14 +104,14 @@ impl Over {
         1..top.map_or(2, |top| top + 1)
     }
 
-    fn fall(&self, column: usize) -> (Fit, Vec<(f64, Estimate)>) {
+    fn fall(&self, column: usize) -> (Fit, Points) {
         let rows = self.rows(column);
-        let points = |at: &dyn Fn(usize, usize) -> Estimate| -> Vec<(f64, Estimate)> {
+        let points = |at: &At<'_>| -> Points {
             // Rows weigh alike.
             rows.clone().map(|row| (self.height(row), Estimate { error: 1.0, ..at(column, row) })).collect()
         };
         let measured = rows.clone().map(|row| (self.height(row), self.mean(column, row, 0))).collect();
-        (self.fitted(&points, 0), measured)
+        (self.fitted(points, 0), measured)
     }
 }
 
@@ -147,6 +148,7 @@ fn compute(settings: &Settings<'_>) -> Result<Report, Error> {
     let gather = |(jet, copies): (&TargetJet, &[Profile])| Over { jet: *jet, copies: copies.to_vec() };
     let over: Vec<Over> = jets.iter().zip(all.chunks(count as usize)).map(gather).collect();
     let mut report = Report::default();
+    note_set_up(&mut report, &jets[0], count);
     exponential(&over, &mut report);
     one_constant(&over, &mut report);
     alike(&over, &mut report);
@@ -187,13 +189,13 @@ fn exponential(over: &[Over], report: &mut Report) {
             decide(
                 report,
                 format!(
-                    "Target of {} jet widths: the {name} stress falls exponentially with the radius, within {:.0} %",
+                    "D_tar / D_jet = {}: the {name} stress falls exponentially with the radius, within {:.0} %",
                     over.jet.target,
                     100.0 * CLOSE
                 ),
                 format!(
                     "C = {}; it misses the stress by {:.0} % (root mean square). From {first} of rho U^2 in the middle the stress is {} at r / R_jet = \
-                     0.5 and {last} at the rim: flat over the middle, as under an ideal jet, and steeper outside",
+                     0.5 and {last} at the rim",
                     fit.slope * -1.0,
                     100.0 * fit.misfit,
                     over.mean(inner, LAYER, part)
@@ -239,7 +241,7 @@ fn alike(over: &[Over], report: &mut Report) {
         decide(
             report,
             format!(
-                "Target of {} jet widths: radial and axial stress are very close, within {:.0} %",
+                "D_tar / D_jet = {}: radial and axial stress are very close, within {:.0} %",
                 over.jet.target,
                 100.0 * CLOSE
             ),
@@ -265,7 +267,7 @@ fn linear(over: &[Over], report: &mut Report) {
             decide(
                 report,
                 format!(
-                    "Target of {} jet widths: at r / R_jet = {name} the radial stress falls linearly with height, within {:.0} % of the largest",
+                    "D_tar / D_jet = {}: at r / R_jet = {name} the radial stress falls linearly with height, within {:.0} % of the largest",
                     over.jet.target,
                     100.0 * STRAIGHT
                 ),
@@ -333,7 +335,7 @@ fn over_radius(over: &[Over]) -> Chart {
         for (part, mark) in [(1, Mark::Points), (0, Mark::OpenPoints)] {
             let points =
                 (0..over.columns()).map(|column| (over.radius(column), over.mean(column, LAYER, part))).collect();
-            let name = format!("{} widths, {}", over.jet.target, NAMES[part]);
+            let name = format!("D_tar / D_jet = {}, {}", over.jet.target, NAMES[part]);
             lines.push(Line { name, points, mark, colour });
         }
         let (fit, points) = over.exponential(1);
@@ -356,7 +358,12 @@ fn over_height(over: &[Over]) -> Chart {
         for ((column, name), mark) in places(over).into_iter().zip([Mark::Points, Mark::OpenPoints]) {
             let rows = over.copies[0][column].len();
             let points = (0..rows).map(|row| (over.height(row), over.mean(column, row, 0))).collect();
-            lines.push(Line { name: format!("{} widths, r / R_jet = {name}", over.jet.target), points, mark, colour });
+            lines.push(Line {
+                name: format!("D_tar / D_jet = {}, r / R_jet = {name}", over.jet.target),
+                points,
+                mark,
+                colour,
+            });
         }
     }
     let most = lines.iter().flat_map(|line| &line.points).map(|(_, at)| at.value + at.error).fold(0.0, f64::max);
@@ -378,15 +385,15 @@ fn map(over: &Over, name: &'static str, part: usize) -> Map {
     let [wide, high] = [columns, rows].map(|count| count as f64 * DIAMETER / (0.5 * over.jet.width()));
     Map {
         name,
-        title: format!("Contact stress, {}, over a target of {} jet widths", NAMES[part], over.jet.target),
-        shows: "Both halves averaged, over time and copies; the target ends at the size it has".into(),
+        title: format!("{} contact stress, D_tar / D_jet = {}", ["Radial", "Axial"][part], over.jet.target),
+        shows: "Averaged over both halves, time and copies; Huang, Chan & Zamankhan (2010), fig. 3 to 5".into(),
         x: length("x / R_jet", -wide, wide),
         y: length("h / R_jet", 0.0, high),
         columns: half.iter().rev().chain(&half).cloned().collect(),
         legend: "stress / rho U^2".into(),
-        most: [0.5, 0.25][usize::from(part == 0)],
+        most: [0.25, 0.6][part],
         grey: String::new(),
-        line: None,
+        line: Some(("target".into(), vec![(-over.jet.target, 0.0), (over.jet.target, 0.0)])),
     }
 }
 

@@ -24,8 +24,8 @@ pub(super) const STUDY: Study = Study {
 const DISTANCES: [f64; 5] = [8.0, 4.0, 2.0, 1.0, 0.5];
 const QUICK_DISTANCES: [f64; 4] = [8.0, 4.0, 1.0, 0.5];
 /// Grains across a jet, and copies.
-const SIZE: (f64, u64) = (12.0, 8);
-const QUICK_SIZE: (f64, u64) = (9.0, 6);
+const SIZE: (f64, u64) = (12.0, 16);
+const QUICK_SIZE: (f64, u64) = (9.0, 8);
 /// Coarse grains: so many across a jet.
 const COARSE: f64 = 4.0;
 /// Of a sheet, half of the mass at least leaves within this angle of the plane between the nozzles, degrees.
@@ -147,6 +147,16 @@ fn compute(settings: &Settings<'_>) -> Result<Report, Error> {
     let all: Vec<Copies> = jets.iter().zip(all.chunks(count as usize)).map(gather).collect();
     let (by_distance, others) = all.split_at(distances.len());
     let mut report = Report::default();
+    report.measured(
+        "What was run",
+        format!(
+            "two planar jets {across} grains of {} mm wide, area fraction {LOOSE} at random, from nozzles at {SPEED} m/s, restitution {} and friction {}, no \
+             gravity; event-driven, {count} copies",
+            1e3 * DIAMETER,
+            reference.restitution,
+            reference.friction
+        ),
+    );
     distance(by_distance, &mut report);
     if let (Some(reference), [coarse, elastic]) =
         (by_distance.iter().find(|copies| copies.jets.distance == reference.distance), others)
@@ -181,8 +191,8 @@ fn distance(by_distance: &[Copies], report: &mut Report) {
         report,
         format!("Near to each other ({} widths) they form none, and scatter off the plane", near.jets.distance),
         format!(
-            "{sheets}. It is not a wide fan: grains in its mouth stop a nozzle, one jet overcomes the other and goes on (mean velocity along the axis / \
-             U_0, whichever way: {}); half of the mass leaves within so many degrees, wherever these are: {}",
+            "{sheets}. Mean velocity along the axis / U_0, whichever way: {}: where it is large one jet has overcome the other, whose nozzle waits while \
+             grains are in its mouth (the paper drives its grains on in the tube). Half of the mass leaves within so many degrees, wherever these are: {}",
             told(by_distance, |run| run.lopsided),
             told(by_distance, |run| run.half_mass_angle)
         ),

@@ -35,12 +35,13 @@ const NOZZLE: f64 = 4.0;
 const SETTLED: f64 = 7.0;
 /// The flow over the target is steady so long after the front has arrived; and a packed jet is looked at until so long before its end arrives.
 const PILED: f64 = 4.0;
-pub(super) const TAIL: f64 = 3.0;
+const TAIL: f64 = 4.0;
 /// From the rim of the target, or the jet if that is wider, to the side of the domain, and from the target to its bottom, in widths of the jet.
 const REACH: f64 = 3.0;
 const DEPTH: f64 = 6.0;
-/// Estimates that are so many standard errors apart differ.
-pub(super) const DEVIATIONS: f64 = 3.0;
+/// Estimates that are so many standard errors apart differ. An error from five or six copies is itself uncertain by a third: beyond four of them lies
+/// one in a hundred.
+pub(super) const DEVIATIONS: f64 = 4.0;
 
 /// How the grains of a jet are arranged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -120,7 +121,7 @@ impl TargetJet {
         Window { from, until, batches }
     }
 
-    /// The part of the run in which the flow over the target is steady, and the end of a packed jet is still three widths above it.
+    /// The part of the run in which the flow over the target is steady, and the end of a packed jet is still four widths above it.
     pub(super) fn flowing(&self, batches: usize) -> Window {
         let [from, until] = [PILED, self.length - TAIL].map(|time| (self.arrival() + time) * self.time());
         Window { from, until, batches }
@@ -253,6 +254,27 @@ pub(super) fn ideal_angle(target: f64) -> f64 {
     low.to_degrees()
 }
 
+/// Notes what was run, as far as all copies have it in common: the papers give few absolute numbers.
+pub(super) fn note_set_up(report: &mut Report, jet: &TargetJet, copies: u64) {
+    let grains = match jet.stream {
+        Stream::Packed => format!("planar, area fraction {PACKED} in a hexagonal lattice, {DISORDER} U_0 of disorder"),
+        Stream::Loose => format!("planar, area fraction {LOOSE} at random"),
+        Stream::Round => format!("round, volume fraction {ROUND} at random"),
+    };
+    report.measured(
+        "What was run",
+        format!(
+            "jets {:.1} grains wide of {} mm at U_0 = {SPEED} m/s ({grains}; variants are named where they come), restitution {} and friction {} of grains \
+             and target, no gravity; scheme {}, {copies} copies; nothing but ratios of lengths, restitution and friction matters to hard grains",
+            jet.width() / DIAMETER,
+            1e3 * DIAMETER,
+            jet.restitution,
+            jet.friction,
+            jet.scheme.name(),
+        ),
+    );
+}
+
 /// Whether an estimate is above a bound: unknown where it is too uncertain.
 pub(super) fn is_above(estimate: Estimate, bound: f64) -> Option<bool> {
     let distance = (estimate.value - bound) / estimate.error;
@@ -277,11 +299,8 @@ pub(super) fn rises(series: &[Estimate]) -> Option<bool> {
 
 /// All of several statements.
 pub(super) fn all(of: impl IntoIterator<Item = Option<bool>>) -> Option<bool> {
-    of.into_iter().fold(Some(true), |all, one| match (all, one) {
-        (Some(false), _) | (_, Some(false)) => Some(false),
-        (Some(true), Some(true)) => Some(true),
-        _ => None,
-    })
+    let of: Vec<Option<bool>> = of.into_iter().collect();
+    if of.contains(&Some(false)) { Some(false) } else { of.iter().all(Option::is_some).then_some(true) }
 }
 
 /// Notes what a claim comes to.
