@@ -8,7 +8,7 @@ mod patches;
 mod surface_stress;
 mod window;
 
-pub use flow::Flow;
+pub use flow::{Flow, FlowCell};
 pub use free_jet::FreeJet;
 pub use grid::Grid;
 pub use outflow::{Outflow, Profile, ProfileMoments, Quantity};

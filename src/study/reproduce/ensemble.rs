@@ -36,14 +36,29 @@ pub fn run_all<K: Sync, O: Observer + Default, T: Send>(
     scene: impl Fn(&K) -> Scene + Sync,
     measure: impl Fn(O) -> T + Sync,
 ) -> Result<Vec<T>, Error> {
+    run_each(tasks, settings, scene, |_| O::default(), measure)
+}
+
+/// The same with an observer that is made for each scene, as what a scene measures is.
+///
+/// # Errors
+/// The first that a run gives.
+pub fn run_each<K: Sync, O: Observer, T: Send>(
+    tasks: &[K],
+    settings: &Settings<'_>,
+    scene: impl Fn(&K) -> Scene + Sync,
+    observer: impl Fn(&Scene) -> O + Sync,
+    measure: impl Fn(O) -> T + Sync,
+) -> Result<Vec<T>, Error> {
     let done = AtomicUsize::new(0);
     let watch = || (settings.watch)(done.load(Ordering::Relaxed) as f64 / tasks.len() as f64);
     let run = |task: &K| {
         if watch().is_break() {
             return Err(Error::BrokenOff);
         }
-        let mut observer = O::default();
-        let mut simulation = Simulation::new(&scene(task), "".as_ref())?;
+        let scene = scene(task);
+        let mut observer = observer(&scene);
+        let mut simulation = Simulation::new(&scene, "".as_ref())?;
         if simulation.run(&mut observer, &mut |_| watch())?.interrupted {
             return Err(Error::BrokenOff);
         }

@@ -6,16 +6,25 @@
 
 mod ensemble;
 mod first_order_or_repeated;
+mod impinging;
 mod jet;
+mod p000_eq50;
+mod p000_fig12;
+mod p000_fig17;
+mod p000_fig4;
+mod p000_fig7;
+mod p000_fig8;
+mod p000_fig9;
 mod p002_fig18;
 mod p002_fig4;
 mod report;
 mod sequence;
+mod trend;
 mod two_grains;
 
 use std::ops::ControlFlow;
 
-pub use ensemble::{Error, run_all};
+pub use ensemble::{Error, run_all, run_each};
 pub use jet::{Energies, Jet};
 pub use report::{Finding, Report, Verdict};
 pub use sequence::Sequence;
@@ -23,6 +32,16 @@ pub use sequence::Sequence;
 /// All studies, in the order in which they are listed.
 #[rustfmt::skip] // a line for each
 pub const STUDIES: &[&Study] = &[
+    &p000_eq50::STUDY,
+    &p000_fig4::STUDY,
+    &p000_fig7::STUDY,
+    &p000_fig8::STUDY,
+    &p000_fig9::FIGURE_9,
+    &p000_fig9::FIGURE_10,
+    &p000_fig9::FIGURE_11,
+    &p000_fig12::STUDY,
+    &p000_fig17::FIGURE_17,
+    &p000_fig17::FIGURE_19,
     &p002_fig4::STUDY,
     &p002_fig18::STUDY,
     &two_grains::STUDY,
