@@ -8,7 +8,15 @@
 mod arrivals;
 mod ensemble;
 mod first_order_or_repeated;
+mod impinging;
 mod jet;
+mod p000_eq50;
+mod p000_fig12;
+mod p000_fig17;
+mod p000_fig4;
+mod p000_fig7;
+mod p000_fig8;
+mod p000_fig9;
 mod p001_fig1;
 mod p001_fig2;
 mod p001_fig3;
@@ -38,6 +46,16 @@ pub use sequence::Sequence;
 /// All studies, in the order in which they are listed.
 #[rustfmt::skip] // a line for each
 pub const STUDIES: &[&Study] = &[
+    &p000_eq50::STUDY,
+    &p000_fig4::STUDY,
+    &p000_fig7::STUDY,
+    &p000_fig8::STUDY,
+    &p000_fig9::FIGURE_9,
+    &p000_fig9::FIGURE_10,
+    &p000_fig9::FIGURE_11,
+    &p000_fig12::STUDY,
+    &p000_fig17::FIGURE_17,
+    &p000_fig17::FIGURE_19,
     &p001_fig1::STUDY,
     &p001_fig2::STUDY,
     &p001_fig3::STUDY,

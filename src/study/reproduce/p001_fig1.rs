@@ -1,8 +1,9 @@
 //! Paper 001, figures 1 and 6: how a jet opens on targets of different sizes.
 
 use super::target_jet::{
-    DEVIATIONS, Fit, Spray, Stream, TargetJet, all, decide, ideal_angle, is_above, note_set_up, rise, rises, run_sprays,
+    DEVIATIONS, Fit, Spray, Stream, TargetJet, ideal_angle, is_above, note_set_up, rise, rises, run_sprays,
 };
+use super::trend::all;
 use super::{Error, Report, Settings, Study};
 use crate::estimate::{Estimate, Slope};
 use crate::shown::{Axis, Chart, Line, Mark, Picture, Table};
@@ -65,8 +66,7 @@ fn opening(name: &str, sprays: &[&Spray], report: &mut Report) {
     let angles = angles(sprays);
     let told: Vec<String> = angles.iter().map(|(target, angle)| format!("{angle} at {target}")).collect();
     let up_to: Vec<Estimate> = angles.iter().filter(|(at, _)| *at <= REACHED).map(|(_, angle)| *angle).collect();
-    decide(
-        report,
+    report.judge(
         format!("A {name} jet: the opening angle grows with the size of the target"),
         format!("degrees at D_tar / D_jet: {}", told.join(", ")),
         rises(&up_to),
@@ -74,8 +74,7 @@ fn opening(name: &str, sprays: &[&Spray], report: &mut Report) {
     let Some(&(target, at_three)) = angles.iter().find(|(target, _)| *target == REACHED) else { return };
     let short = rise(at_three, Estimate::exact(90.0));
     let near = is_above(short, 90.0 * NEAR).map(|above| !above);
-    decide(
-        report,
+    report.judge(
         format!("A {name} jet: the angle is near 90 degrees at {target} widths, within {:.0} % of it", 100.0 * NEAR),
         format!("{at_three} degrees; an ideal planar jet has {:.2}", ideal_angle(target)),
         near,
@@ -102,16 +101,14 @@ fn opening(name: &str, sprays: &[&Spray], report: &mut Report) {
         ),
         line.misfit < STRAIGHT,
     );
-    decide(report, format!("A {name} jet: it goes with the square of the size (section II)"), measured, is(2.0));
+    report.judge(format!("A {name} jet: it goes with the square of the size (section II)"), measured, is(2.0));
     let (at, off) = angles
         .iter()
         .map(|&(at, angle)| (at, rise(Estimate::exact(ideal_angle(at)), angle)))
         .max_by(|a, b| a.1.value.abs().total_cmp(&b.1.value.abs()))
         .unwrap_or((0.0, Estimate::exact(0.0)));
     let largest = Estimate { value: off.value.abs(), ..off };
-    decide(
-        report,
-        format!(
+    report.judge(format!(
             "A {name} jet opens as an ideal planar jet does (Ellowitz et al. 2013: a perfect fluid), within {IDEAL} degrees"
         ),
         format!("the largest difference is {off} degrees, at {at}"),
@@ -135,9 +132,7 @@ fn velocity(name: &str, sprays: &[&Spray], report: &mut Report) {
     };
     let Some((at, worst)) = known.iter().map(miss).max_by(|a, b| a.1.value.total_cmp(&b.1.value)) else { return };
     let told: Vec<String> = known.iter().map(|(at, left)| format!("{left} at {at}")).collect();
-    decide(
-        report,
-        format!("A {name} jet: U_h / U_0 = exp(-C R_tar / R_jet), within {:.0} %", 100.0 * CLOSE),
+    report.judge(format!("A {name} jet: U_h / U_0 = exp(-C R_tar / R_jet), within {:.0} %", 100.0 * CLOSE),
         format!(
             "C = {}, which misses U_h / U_0 by up to {worst} of it, at {at}; U_h / U_0 is {}. Of an ideal planar jet it is cos psi, not exponential",
             slope * -1.0,

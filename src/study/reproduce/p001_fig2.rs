@@ -1,8 +1,7 @@
 //! Paper 001, figure 2: sheets of fine grains, fireworks of coarse ones; and whether elastic grains make a sheet.
 
-use super::target_jet::{
-    DIAMETER, Spray, Stream, TargetJet, all, decide, is_above, note_set_up, rise, rises, run_sprays,
-};
+use super::target_jet::{DIAMETER, Spray, Stream, TargetJet, is_above, note_set_up, rise, rises, run_sprays};
+use super::trend::all;
 use super::{Error, Report, Settings, Study};
 use crate::estimate::Estimate;
 use crate::shown::{Axis, Chart, Line, Picture, Table};
@@ -95,16 +94,14 @@ fn times(wide: Estimate, narrow: Estimate) -> Estimate {
 
 fn grain_size(name: &str, sprays: &[Spray], report: &mut Report) {
     let angles: Vec<Estimate> = sprays.iter().map(Spray::half_mass_angle).collect();
-    decide(
-        report,
+    report.judge(
         format!("{name} of restitution 0.8: the half-mass angle grows with the size of the grains"),
         told(sprays),
         rises(&angles),
     );
     let (Some(&finest), Some(&coarsest)) = (angles.first(), angles.last()) else { return };
     let ratio = times(coarsest, finest);
-    decide(
-        report,
+    report.judge(
         format!("{name}: a sheet of fine grains, fireworks of coarse ones, {FIREWORKS} times as wide at least"),
         format!("{ratio} times as wide: {finest} and {coarsest} degrees"),
         is_above(ratio, FIREWORKS),
@@ -121,8 +118,7 @@ fn restitution(softer: &[Spray], harder: &[Spray], report: &mut Report) {
     // It matters if it does so at one size at least.
     let matters =
         pairs.iter().any(|(_, rise)| is_above(Estimate { value: rise.value.abs(), ..*rise }, 0.0) == Some(true));
-    decide(
-        report,
+    report.judge(
         "The half-mass angle depends on restitution",
         format!("from restitution 0.7 to 0.9 it rises by so many degrees at d / D_jet: {}", told.join(", ")),
         matters.then_some(true),
@@ -139,9 +135,7 @@ fn no_sheet(reference: &[Spray], elastic: &[Spray], report: &mut Report) {
     let least = |ratio: &&Estimate| ratio.value;
     let Some(worst) = ratios.iter().min_by(|a, b| least(a).total_cmp(&least(b))) else { return };
     let (Some(finest), Some(lossy)) = (elastic.first(), reference.first()) else { return };
-    decide(
-        report,
-        format!(
+    report.judge(format!(
             "Elastic and frictionless grains form no sheet: they scatter {NO_SHEET} times as wide as those of restitution 0.8 at least"
         ),
         format!(

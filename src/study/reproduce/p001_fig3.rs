@@ -1,7 +1,8 @@
 //! Paper 001, figures 3 to 5: the stress over targets of three sizes.
 
 use super::ensemble::run_observed;
-use super::target_jet::{DIAMETER, Fit, TargetJet, all, copies, decide, is_above, length, note_set_up, rise};
+use super::target_jet::{DIAMETER, Fit, TargetJet, copies, is_above, length, note_set_up, rise};
+use super::trend::all;
 use super::{Error, Report, Settings, Study};
 use crate::estimate::Estimate;
 use crate::observe::measure::{Flow, Grid};
@@ -186,9 +187,7 @@ fn exponential(over: &[Over], report: &mut Report) {
                 .collect();
             let (first, last) = (over.mean(0, LAYER, part), over.mean(points.len() - 1, LAYER, part));
             let inner = points.iter().take_while(|(radius, _)| *radius < 0.5).count();
-            decide(
-                report,
-                format!(
+            report.judge(format!(
                     "D_tar / D_jet = {}: the {name} stress falls exponentially with the radius, within {:.0} %",
                     over.jet.target,
                     100.0 * CLOSE
@@ -217,8 +216,7 @@ fn one_constant(over: &[Over], report: &mut Report) {
             let difference = rise(a, b);
             is_above(Estimate { value: difference.value.abs(), ..difference }, CLOSE * mean).map(|above| !above)
         });
-        decide(
-            report,
+        report.judge(
             format!("One C of the {name} stress for all sizes of the target, within {:.0} %", 100.0 * CLOSE),
             format!("C at D_tar / D_jet: {}", told.join(", ")),
             all(alike),
@@ -238,8 +236,7 @@ fn alike(over: &[Over], report: &mut Report) {
             .collect();
         let ratio = Estimate::ratio(&sums);
         let difference = Estimate { value: (ratio.value - 1.0).abs(), ..ratio };
-        decide(
-            report,
+        report.judge(
             format!(
                 "D_tar / D_jet = {}: radial and axial stress are very close, within {:.0} %",
                 over.jet.target,
@@ -264,9 +261,7 @@ fn linear(over: &[Over], report: &mut Report) {
             let (fit, points) = over.fall(column);
             let most = points.iter().map(|(_, stress)| stress.value).fold(0.0, f64::max);
             slopes[number].push((over.jet.target, fit.slope));
-            decide(
-                report,
-                format!(
+            report.judge(format!(
                     "D_tar / D_jet = {}: at r / R_jet = {name} the radial stress falls linearly with height, within {:.0} % of the largest",
                     over.jet.target,
                     100.0 * STRAIGHT
@@ -288,8 +283,7 @@ fn linear(over: &[Over], report: &mut Report) {
             let difference = rise(pair[0].1, pair[1].1);
             is_above(Estimate { value: difference.value.abs(), ..difference }, CLOSE * mean).map(|above| !above)
         });
-        decide(
-            report,
+        report.judge(
             format!("At r / R_jet = {name} the slope is almost the same for all sizes, within {:.0} %", 100.0 * CLOSE),
             format!("rho U^2 / R_jet at D_tar / D_jet: {}", told.join(", ")),
             all(steps),

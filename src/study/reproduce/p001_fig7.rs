@@ -1,7 +1,8 @@
 //! Paper 001, figures 7 and 8: overlaps of soft spheres, and where grains are dense, over targets of three sizes.
 
 use super::ensemble::run_observed;
-use super::target_jet::{DIAMETER, TargetJet, all, copies, decide, is_above, length, note_set_up, rise, rises};
+use super::target_jet::{DIAMETER, TargetJet, copies, is_above, length, note_set_up, rise, rises};
+use super::trend::all;
 use super::{Error, Report, Settings, Study};
 use crate::estimate::Estimate;
 use crate::grains::Snapshot;
@@ -277,8 +278,7 @@ fn overlaps(over: &[Over], report: &mut Report) {
             late < LIMITS[1],
         );
         let fall = over.mean(|run| run.early - run.late);
-        decide(
-            report,
+        report.judge(
             format!("D_tar / D_jet = {target}: overlaps are deepest when the front of the jet arrives"),
             format!("{} until the stream has settled, {} after", over.mean(|run| run.early), over.mean(|run| run.late)),
             is_above(fall, 0.0),
@@ -300,9 +300,7 @@ fn zones(over: &[Over], report: &mut Report) {
             is_above(excess, 0.0).map(|above| !above)
         };
         let target = over.jet.target;
-        decide(
-            report,
-            format!(
+        report.judge(format!(
                 "D_tar / D_jet = {target}: overlaps and stress are high in the condensed zone and low in jet and free zone, {LOW} of it at most"
             ),
             format!("1000 delta*: {}; contact pressure / rho U^2: {}", thousand(over), told(1)),
@@ -310,9 +308,7 @@ fn zones(over: &[Over], report: &mut Report) {
         );
         // Each is compared with half of the jet's area fraction.
         let half = 0.5 * super::target_jet::PACKED;
-        decide(
-            report,
-            format!(
+        report.judge(format!(
                 "D_tar / D_jet = {target}: the jet and the condensed zone are dense, the free zone is not (area fraction above and below {half})"
             ),
             told(2),
@@ -342,8 +338,7 @@ fn areas(over: &[Over], report: &mut Report) {
         told.join(", ")
     };
     let [dense, printed] = [0, 1].map(|bound| series(&|run| run.dense[bound]));
-    decide(
-        report,
+    report.judge(
         format!("The area of high volume fraction, above {DENSE}, grows with the target"),
         format!("area beside the jet over the square of its width, at D_tar / D_jet: {}", told(&dense)),
         rises(&dense),
@@ -356,8 +351,7 @@ fn areas(over: &[Over], report: &mut Report) {
     // As above: less and more than half as dense as the jet.
     let half = 0.5 * super::target_jet::PACKED;
     let (parted, linked) = (is_above(rise(link[0], Estimate::exact(half)), 0.0), is_above(link[2], half));
-    decide(
-        report,
+    report.judge(
         "Jet and condensed zone are apart over the smallest target and link when it becomes bigger",
         format!(
             "least volume fraction along the axis between target and jet (apart below {half}), at D_tar / D_jet: {}",

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::ensemble::run_observed;
-use super::target_jet::{DENSITY, DIAMETER, LOOSE, SPEED, copies, decide, is_above, rise};
+use super::target_jet::{DENSITY, DIAMETER, LOOSE, SPEED, copies, is_above, rise};
 use super::{Error, Report, Settings, Study};
 use crate::estimate::Estimate;
 use crate::observe::Ledger;
@@ -181,15 +181,12 @@ fn distance(by_distance: &[Copies], report: &mut Report) {
         "part of the mass that leaves within {SHEET} degrees of the plane between the nozzles, at their distance / D_jet: {}",
         told(by_distance, |run| run.sheet)
     );
-    decide(
-        report,
+    report.judge(
         format!("Far apart ({} widths) they form a sheet: half of the mass within {SHEET} degrees", far.jets.distance),
         sheets.clone(),
         is_above(far.mean(|run| run.sheet), 0.5),
     );
-    decide(
-        report,
-        format!("Near to each other ({} widths) they form none, and scatter off the plane", near.jets.distance),
+    report.judge(format!("Near to each other ({} widths) they form none, and scatter off the plane", near.jets.distance),
         format!(
             "{sheets}. Mean velocity along the axis / U_0, whichever way: {}: where it is large one jet has overcome the other, whose nozzle waits while \
              grains are in its mouth (the paper drives its grains on in the tube). Half of the mass leaves within so many degrees, wherever these are: {}",
@@ -199,16 +196,13 @@ fn distance(by_distance: &[Copies], report: &mut Report) {
         is_above(near.mean(|run| run.sheet), 0.5).map(|above| !above),
     );
     let wider = rise(far.mean(|run| run.half_mass_angle), near.mean(|run| run.half_mass_angle));
-    decide(
-        report,
+    report.judge(
         "Near to each other the scattering (half-mass) angle is larger than far apart",
         format!("{wider} degrees larger"),
         is_above(wider, 0.0),
     );
     let kept = rise(far.mean(|run| run.kept), near.mean(|run| run.kept));
-    decide(
-        report,
-        "Near to each other less kinetic energy is dissipated",
+    report.judge("Near to each other less kinetic energy is dissipated",
         format!(
             "kinetic energy of what leaves over that with which it came, at the distance / D_jet: {}; the difference is {kept}",
             told(by_distance, |run| run.kept)
@@ -224,8 +218,7 @@ fn grains(reference: &Copies, coarse: &Copies, elastic: &Copies, report: &mut Re
         ("The half-mass angle depends on restitution", elastic, "elastic and frictionless".to_owned()),
     ] {
         let difference = rise(angle(reference), angle(other));
-        decide(
-            report,
+        report.judge(
             claim,
             format!(
                 "{} degrees with {} grains across and restitution 0.8, {} {name}, {} widths apart",

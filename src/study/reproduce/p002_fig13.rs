@@ -1,7 +1,7 @@
 //! Paper 002, figures 13 to 15: energy to the surface over time and on average, over restitution and friction.
 
 use super::arrivals::{Arrived, Bin, run_arrivals};
-use super::trend::{all, falls, is_below, is_within, judge};
+use super::trend::{all, falls, is_below, is_within};
 use super::{Error, Jet, Report, Settings, Study};
 use crate::estimate::Estimate;
 use crate::shown::{Axis, Chart, Line, Mark, Picture, Table};
@@ -110,8 +110,7 @@ fn values(series: &Series, of: impl Fn(&Arrived) -> Estimate) -> Vec<Estimate> {
 }
 
 fn test_restitution(series: &Series, report: &mut Report) {
-    judge(
-        report,
+    report.judge(
         format!("{}: the more elastic, the less energy all hits together carry to the surface", name(series)),
         format!("over E0: {}", told(series, total)),
         falls(&values(series, total)),
@@ -120,8 +119,7 @@ fn test_restitution(series: &Series, report: &mut Report) {
 
 fn test_shielding(series: &Series, report: &mut Report) {
     let first = |at: &Arrived| at.mean(|copy| copy.energies.first_hits);
-    judge(
-        report,
+    report.judge(
         format!(
             "{}: the more elastic, the less energy oncoming grains carry through those that rebound (first hits)",
             name(series)
@@ -139,8 +137,7 @@ fn test_steadiness(series: &Series, report: &mut Report) {
         };
         Estimate::ratio(&at.copies.iter().map(halves).collect::<Vec<_>>())
     };
-    judge(
-        report,
+    report.judge(
         format!(
             "{}: a quasi-steady state (power from 21 to 30 ms as from 12 to 21 ms, within {:.0} %)",
             name(series),
@@ -150,8 +147,7 @@ fn test_steadiness(series: &Series, report: &mut Report) {
         all(series.iter().map(|at| is_within(ratio(at), 1.0, STEADY))),
     );
     let late = |at: &Arrived| at.mean(|copy| copy.between([OVER, UNTIL], energy) / copy.total(energy));
-    judge(
-        report,
+    report.judge(
         format!(
             "{}: in the end all grains move away and impart no more energy (less than {:.0} % of it after {:.0} ms)",
             name(series),
@@ -166,8 +162,7 @@ fn test_steadiness(series: &Series, report: &mut Report) {
 fn test_average(series: &Series, report: &mut Report) {
     let average = |at: &Arrived| at.regime(energy);
     let high: Vec<Estimate> = series.iter().filter(|at| at.jet.restitution >= HIGH).map(average).collect();
-    judge(
-        report,
+    report.judge(
         format!(
             "{}: the average of the quasi-steady state falls towards the higher restitutions (from {HIGH} to 1)",
             name(series)
@@ -178,8 +173,7 @@ fn test_average(series: &Series, report: &mut Report) {
     let is_high = |at: &&Arrived| at.jet.restitution == 0.8;
     let (Some(lowest), Some(high)) = (series.first(), series.iter().find(is_high)) else { return };
     let [low, high] = [lowest, high].map(average);
-    judge(
-        report,
+    report.judge(
         format!(
             "{}: it rises significantly (by {:.0} % or more) as collisions get more inelastic, from e = 0.8 to {}",
             name(series),
@@ -225,9 +219,7 @@ fn test_friction(smooth: &Series, rough: &Series, report: &mut Report) {
             format!("{} becomes {} at e = {e}", total(smooth), total(rough))
         });
         let Jet { grains, friction, .. } = rough[0].jet;
-        judge(
-            report,
-            format!(
+        report.judge(format!(
                 "{grains} grains, restitution {} {HIGH}: friction of {friction} reduces the energy carried to the surface",
                 if high { "from" } else { "below" }
             ),

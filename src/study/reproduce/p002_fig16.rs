@@ -1,7 +1,7 @@
 //! Paper 002, figure 16: the interference parameter over restitution and friction.
 
 use super::jet::copies_of;
-use super::trend::{all, is_below, judge};
+use super::trend::{all, is_below};
 use super::{Energies, Error, Jet, Report, Settings, Study};
 use crate::estimate::Estimate;
 use crate::grains::{Snapshot, kinetic_energy};
@@ -133,8 +133,7 @@ fn told<'a>(points: impl Iterator<Item = &'a Point>, of: impl Fn(&Point) -> Esti
 fn test_signs(points: &[Point], report: &mut Report) {
     let zero = Estimate::exact(0.0);
     let high = || points.iter().filter(|point| point.jet.restitution == HIGH);
-    judge(
-        report,
+    report.judge(
         format!(
             "alpha_interf < 0 at high restitution (e = {HIGH}): there is less energy left than without interference"
         ),
@@ -142,8 +141,7 @@ fn test_signs(points: &[Point], report: &mut Report) {
         all(high().map(|point| is_below(point.alpha(), zero))),
     );
     let low = || points.iter().filter(|point| point.jet.restitution <= LOW);
-    judge(
-        report,
+    report.judge(
         format!(
             "alpha_interf > 0 at low restitution (up to e = {LOW}): there is more energy left than without interference"
         ),
@@ -167,9 +165,7 @@ fn test_what_is_trapped(points: &[Point], report: &mut Report) {
         let at = point.look(ARRIVED);
         Estimate::ratio(&point.copies.iter().map(|left| (left.energies.left, left.history[at].1)).collect::<Vec<_>>())
     };
-    judge(
-        report,
-        format!(
+    report.judge(format!(
             "Where alpha_interf > 0, it is that of slow grains trapped near the surface: their energy is lost in the end (most of what is left at {:.0} ms is gone at 500 ms)",
             1e3 * ARRIVED
         ),

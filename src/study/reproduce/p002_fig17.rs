@@ -1,7 +1,7 @@
 //! Paper 002, figure 17: energy to the surface over the angle of the jet.
 
 use super::arrivals::{Arrived, Bin, run_arrivals};
-use super::trend::{all, falls, is_below, judge};
+use super::trend::{all, falls, is_below};
 use super::{Error, Jet, Report, Settings, Study};
 use crate::estimate::Estimate;
 use crate::shown::{Axis, Chart, Line, Mark, Picture, Table};
@@ -79,14 +79,12 @@ fn test(series: &[Arrived], report: &mut Report) {
     let name = format!("{} grains, e = {}, mu = {}", jet.grains, jet.restitution, jet.friction);
     let of = |of: fn(&Bin) -> f64| series.iter().map(|at| at.regime(of)).collect::<Vec<_>>();
     let (normal, all_energy, along) = (of(normal_of), of(all_of), of(other_of));
-    judge(
-        report,
+    report.judge(
         format!("{name}: the normal energy falls with the angle"),
         format!("power over that of the jet, from 12 to 30 ms: {}", told(&normal)),
         falls(&normal),
     );
-    judge(
-        report,
+    report.judge(
         format!("{name}: normal and tangential energy together are greatest at an intermediate angle"),
         format!("{}; of it along the surface and in rotation {}", told(&all_energy), told(&along)),
         peak_inside(&all_energy),

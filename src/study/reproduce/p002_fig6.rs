@@ -2,7 +2,7 @@
 
 use super::jet::copies_of;
 use super::stills::{Seen, Stills, View, side_view};
-use super::trend::{all, is_below, judge};
+use super::trend::{all, is_below};
 use super::{Error, Jet, Report, Settings, Study};
 use crate::estimate::Estimate;
 use crate::scene::{Inside, Scene, Source};
@@ -172,9 +172,7 @@ fn test_looseness(seen: &[Seens], report: &mut Report) {
         Estimate::mean(&gaps.collect::<Vec<_>>())
     };
     for at in seen.iter().filter(|at| [FEW, MANY].contains(&at.jet.grains)) {
-        judge(
-            report,
-            format!(
+        report.judge(format!(
                 "{} grains are a loosely flowing stream (a gap of {LOOSE} diameter or more from a grain to the one nearest to it, on average)",
                 at.jet.grains
             ),
@@ -194,16 +192,13 @@ fn test_spread(seen: &[Seens], report: &mut Report) {
     let (Some(few), Some(many)) = (of(FEW), of(MANY)) else { return };
     let name = |at: &Seens| format!("{} with {} grains", at.mean(|spread| spread.distance), at.jet.grains);
     let [wide, narrow] = [many, few].map(|at| at.mean(|spread| spread.distance));
-    judge(
-        report,
-        format!(
+    report.judge(format!(
             "Interfering collisions spread the jet of {MANY} grains: at 50 ms grains are further from the axis than where they started (rms)"
         ),
         format!("{wide} m from the axis, from {:.3} m at the start", many.jet.width / 6.0_f64.sqrt()),
         is_below(Estimate::exact(many.jet.width / 6.0_f64.sqrt()), wide),
     );
-    judge(
-        report,
+    report.judge(
         format!(
             "{FEW} grains do not spread so (their rms distance from the axis at 50 ms is below {SO} of that of {MANY})"
         ),
@@ -211,15 +206,13 @@ fn test_spread(seen: &[Seens], report: &mut Report) {
         is_below(narrow, wide * SO),
     );
     let [dense, thin] = [many, few].map(|at| at.mean(|spread| spread.sheet));
-    judge(
-        report,
+    report.judge(
         format!("{MANY} grains form a sheet along the surface, {FEW} do not (most of them fly within {SHEET}° of it)"),
         format!("part that does: {dense} of {MANY}, {thin} of {FEW}"),
         all([is_below(Estimate::exact(MOST), dense), is_below(thin, Estimate::exact(MOST))]),
     );
     let angles = |at: &Seens| format!("{}° with {}", at.mean(|spread| spread.angle), at.jet.grains);
-    judge(
-        report,
+    report.judge(
         "The fewer grains, the nearer to the normal they leave (median angle)",
         seen.iter().map(angles).collect::<Vec<_>>().join(", "),
         all(seen.windows(2).map(|pair| is_below(pair[0].mean(|s| s.angle), pair[1].mean(|s| s.angle)))),

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::jet::copies_of;
 use super::stills::{Seen, Stills, View, side_view};
-use super::trend::{all, falls, is_below, is_within, judge};
+use super::trend::{all, falls, is_below, is_within};
 use super::{Error, Jet, Report, Settings, Study};
 use crate::estimate::Estimate;
 use crate::observe::measure::{Contact, DamageCell, Grid, HalfSpace, Subsurface, Window};
@@ -238,9 +238,7 @@ fn test_growth(normal: &Copies, report: &mut Report) {
     let told = volumes.iter().enumerate().map(|(step, volume)| format!("{volume} l after {} ms", 10 * (step + 1)));
     // While the jet arrives, to 32 ms.
     let grows = volumes[..3].windows(2).map(|pair| is_below(pair[0], pair[1]));
-    judge(
-        report,
-        format!("{}: damage propagates while the jet arrives", normal.name()),
+    report.judge(format!("{}: damage propagates while the jet arrives", normal.name()),
         format!(
             "volume with an equivalent stress above {:.0} MPa: {} (bulk modulus {:.0} GPa, Poisson's ratio {POISSON_RATIO}, rigid grains, Hertz contacts)",
             THRESHOLD / 1e6,
@@ -253,8 +251,7 @@ fn test_growth(normal: &Copies, report: &mut Report) {
 
 fn test_symmetry(normal: &Copies, report: &mut Report) {
     let centroids = [0, 1].map(|axis| normal.mean(|outcome| centroid(outcome, axis)));
-    judge(
-        report,
+    report.judge(
         format!("{}: damage is symmetric (its centroid is within half a grain of the axis)", normal.name()),
         format!("centroid at x = {} mm, y = {} mm", centroids[0] * 1e3, centroids[1] * 1e3),
         all(centroids.map(|centroid| is_within(centroid, 0.0, MIDDLE))),
@@ -272,9 +269,7 @@ fn test_moduli(report: &mut Report) {
     let exact = |of: fn(&Elastic) -> f64| solids.iter().map(|solid| Estimate::exact(of(solid))).collect::<Vec<_>>();
     let [bulk, shear] = [exact(|solid| solid.bulk), exact(|solid| solid.shear)];
     let last = solids[POROSITIES.len() - 1];
-    judge(
-        report,
-        "Pores weaken the solid: bulk and shear modulus fall with the porosity (upper bounds of Hashin & Shtrikman)",
+    report.judge("Pores weaken the solid: bulk and shear modulus fall with the porosity (upper bounds of Hashin & Shtrikman)",
         format!(
             "from porosity 0 to 0.5 the bulk modulus falls to {:.1} %, the shear modulus to {:.1} %, Poisson's ratio from {POISSON_RATIO} to {:.4}",
             100.0 * last.bulk / solids[0].bulk,
@@ -310,18 +305,14 @@ fn test_porosity(normal: &Copies, report: &mut Report) {
         )
     };
     let [same, own, fifth] = [0, 1, 2].map(|variant| stress_ratio(normal, variant));
-    judge(
-        report,
-        "The more porous the solid, the higher the stresses (by more than 1 %), if contacts last as long as on the dense solid",
+    report.judge("The more porous the solid, the higher the stresses (by more than 1 %), if contacts last as long as on the dense solid",
         format!(
             "{}: eq. (49) to (58) know no modulus, and no impulse does, so that only Poisson's ratio counts",
             told(same)
         ),
         higher(same),
     );
-    judge(
-        report,
-        "The more porous the solid, the higher the stresses (by more than 1 %), if contacts last as long as the porous solid makes them",
+    report.judge("The more porous the solid, the higher the stresses (by more than 1 %), if contacts last as long as the porous solid makes them",
         format!("{}: softer contacts last longer, and their forces are smaller", told(own)),
         higher(own),
     );
@@ -337,32 +328,27 @@ fn test_angle(copies: &Copies, report: &mut Report) {
     let pairs: Vec<(f64, f64)> =
         copies.outcomes.iter().map(|outcome| outcome.collisions.map(|count| count as f64).into()).collect();
     let ratio = Estimate::ratio(&pairs);
-    judge(
-        report,
+    report.judge(
         format!("{name}: more collisions over the part of the surface that the jet hits first than over the other"),
         format!("ratio of the two: {ratio}"),
         is_below(Estimate::exact(1.0), ratio),
     );
     let energies = Estimate::ratio(&copies.outcomes.iter().map(|outcome| outcome.first.into()).collect::<Vec<_>>());
-    judge(
-        report,
+    report.judge(
         format!("{name}: where it arrives later, grains lose less energy before they hit for the first time"),
         format!("energy of a first hit on the part that is hit first, over that on the other: {energies}"),
         is_below(energies, Estimate::exact(1.0)),
     );
     let shift = copies.mean(|outcome| centroid(outcome, 0));
     let magnitude = Estimate { value: shift.value.abs(), ..shift };
-    judge(
-        report,
+    report.judge(
         format!("{name}: the damage is asymmetric along the slope"),
         format!("its centroid is {} mm down the slope from the axis of the jet", shift * 1e3),
         is_below(zero, magnitude),
     );
     let zone = is_below(Estimate::exact(1.0), ratio);
     let loads = is_below(shift, zero);
-    judge(
-        report,
-        format!("{name}: collision zone and damage lean to the same side"),
+    report.judge(format!("{name}: collision zone and damage lean to the same side"),
         format!(
             "{ratio} times the collisions over the side that is hit first, and the damage {} mm up the slope, towards it: grains rebound across to the \
              side that is hit later, and shield it",

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use nalgebra::Vector3;
 
 use super::ensemble::run_observed;
+
 use super::{Error, Report, Settings};
 use crate::estimate::Estimate;
 use crate::observe::measure::{Ejecta, Ejected, Window};
@@ -297,20 +298,6 @@ pub(super) fn rises(series: &[Estimate]) -> Option<bool> {
     if whole == Some(true) { Some(true) } else { None }
 }
 
-/// All of several statements.
-pub(super) fn all(of: impl IntoIterator<Item = Option<bool>>) -> Option<bool> {
-    let of: Vec<Option<bool>> = of.into_iter().collect();
-    if of.contains(&Some(false)) { Some(false) } else { of.iter().all(Option::is_some).then_some(true) }
-}
-
-/// Notes what a claim comes to.
-pub(super) fn decide(report: &mut Report, claim: impl Into<String>, measured: impl Into<String>, agrees: Option<bool>) {
-    match agrees {
-        Some(agrees) => report.put_to_the_test(claim, measured, agrees),
-        None => report.undecided(claim, measured),
-    }
-}
-
 /// The straight line y = intercept + slope x that fits points best, each weighed by its error, and √ mean (deviation)² of the points from it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Fit {
@@ -380,8 +367,6 @@ mod tests {
         assert_eq!(rises(&[at(0.0), at(1.0), at(9.0)]), Some(true));
         assert_eq!(rises(&[at(0.0), at(1.0), at(2.0)]), None);
         assert_eq!(rises(&[at(0.0), at(20.0), at(10.0)]), Some(false));
-        assert_eq!(all([Some(true), None]), None);
-        assert_eq!(all([None, Some(false)]), Some(false));
     }
 
     #[test]
