@@ -12,10 +12,8 @@ mod limits;
 mod load;
 mod measure;
 mod near_field;
-mod outflow;
 mod shape;
 mod stepped;
-mod surface_stress;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -27,13 +25,12 @@ pub use error::{Invalid, SceneError};
 pub(crate) use limits::{LARGEST, SMALLEST};
 pub use load::{Overrides, SceneFile};
 pub use measure::{
-    ContactTime, EjectaMeasure, Elastic, FlowMeasure, Measure, Span, SubsurfaceMeasure, SurfaceEnergyMeasure,
+    ContactTime, EjectaMeasure, Elastic, FlowMeasure, FreeJet, Measure, OutflowMeasure, PatchGrid, Side, Span,
+    SubsurfaceMeasure, SurfaceEnergyMeasure, SurfaceStressMeasure,
 };
 pub use near_field::{Auto, DEFAULT_PENETRATION, NearField, Substep, Summation};
-pub use outflow::{OutflowMeasure, Side};
 pub use shape::schema;
 pub use stepped::{FixedPoint, SoftSphere, Trapezoidal};
-pub use surface_stress::{FreeJet, PatchGrid, SurfaceStressMeasure};
 
 /// A vector as it stands in the file: `[x, y, z]`.
 pub type Vec3 = [f64; 3];

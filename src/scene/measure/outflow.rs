@@ -3,9 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::limits::{Checked, positive};
-use super::measure::{CELLS_MAX, default_batches};
-use super::{Boundary, Invalid, Scene};
+use super::{CELLS_MAX, default_batches};
+use crate::scene::limits::{Checked, positive};
+use crate::scene::{Boundary, Invalid, Scene};
 
 /// `kind = "outflow"`: mass, momentum and energy that leave through sides of an open domain, over height, with the moments of each profile
 /// (Arbelaez et al. 2009, eq. 55 to 61).

@@ -4,9 +4,9 @@ use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::limits::{Checked, in_plane, not_negative, positive};
-use super::measure::{CELLS_MAX, default_batches};
-use super::{Invalid, Scene, Surface, Vec3};
+use super::{CELLS_MAX, default_batches};
+use crate::scene::limits::{Checked, in_plane, not_negative, positive};
+use crate::scene::{Invalid, Scene, Surface, Vec3};
 
 /// Sine of the angle between two directions below which rounding would say what is across the other.
 const PARALLEL: f64 = 1e-9;
