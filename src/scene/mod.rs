@@ -14,6 +14,7 @@ mod measure;
 mod near_field;
 mod shape;
 mod stepped;
+mod subsurface;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -24,10 +25,11 @@ pub use contact::{Collapse, Contact, Contacts, Friction, Regularised, StaticDyna
 pub use error::{Invalid, SceneError};
 pub(crate) use limits::{LARGEST, SMALLEST};
 pub use load::{Overrides, SceneFile};
-pub use measure::{ContactTime, Elastic, FlowMeasure, Measure, Span, SubsurfaceMeasure, SurfaceEnergyMeasure};
+pub use measure::{FlowMeasure, Measure, Span, SurfaceEnergyMeasure};
 pub use near_field::{Auto, DEFAULT_PENETRATION, NearField, Substep, Summation};
 pub use shape::schema;
 pub use stepped::{FixedPoint, SoftSphere, Trapezoidal};
+pub use subsurface::{ContactTime, Elastic, SubsurfaceMeasure};
 
 /// A vector as it stands in the file: `[x, y, z]`.
 pub type Vec3 = [f64; 3];

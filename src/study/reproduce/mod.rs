@@ -2,8 +2,9 @@
 //!
 //! A study is a file here (named after the paper's number and its figure) and a line in [`STUDIES`]. It gets [`Settings`] and gives a [`Report`]; it reads no file and writes none.
 //! What studies share: [`run_all`] (many runs on all cores, in a fixed order), [`Estimate`](crate::estimate::Estimate) (a mean and how sure it is),
-//! [`shown`](crate::shown) (tables and pictures as data), [`Jet`] (the reference jet), `trend` (whether a series falls, beyond its errors) and [`Sequence`] (two grains and a wall, in closed form).
+//! [`shown`](crate::shown) (tables and pictures as data), [`Jet`] (the reference jet), `answers` (yes, no, or too close to tell) and [`Sequence`] (two grains and a wall, in closed form).
 
+mod answers;
 mod arrivals;
 mod ensemble;
 mod first_order_or_repeated;
@@ -18,7 +19,6 @@ mod p002_fig8;
 mod report;
 mod sequence;
 mod stills;
-mod trend;
 mod two_grains;
 
 use std::ops::ControlFlow;

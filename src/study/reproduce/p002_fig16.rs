@@ -1,7 +1,7 @@
 //! Paper 002, figure 16: the interference parameter over restitution and friction.
 
+use super::answers::{all, is_below, judge};
 use super::jet::copies_of;
-use super::trend::{all, is_below, judge};
 use super::{Energies, Error, Jet, Report, Settings, Study};
 use crate::estimate::Estimate;
 use crate::grains::{Snapshot, kinetic_energy};

@@ -1,7 +1,7 @@
 //! Paper 002, figure 17: energy to the surface over the angle of the jet.
 
+use super::answers::{all, falls, is_below, judge};
 use super::arrivals::{Arrived, Bin, run_arrivals};
-use super::trend::{all, falls, is_below, judge};
 use super::{Error, Jet, Report, Settings, Study};
 use crate::estimate::Estimate;
 use crate::shown::{Axis, Chart, Line, Mark, Picture, Table};

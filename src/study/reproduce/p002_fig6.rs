@@ -1,8 +1,8 @@
 //! Paper 002, figures 6, 7 and 9: the block of 10 000 grains, and how it spreads on impact.
 
+use super::answers::{all, is_below, judge};
 use super::jet::copies_of;
 use super::stills::{Seen, Stills, View, side_view};
-use super::trend::{all, is_below, judge};
 use super::{Error, Jet, Report, Settings, Study};
 use crate::estimate::Estimate;
 use crate::scene::{Inside, Scene, Source};

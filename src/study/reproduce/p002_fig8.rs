@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
+use super::answers::{all, falls, is_below, is_within, judge};
 use super::jet::copies_of;
 use super::stills::{Seen, Stills, View, side_view};
-use super::trend::{all, falls, is_below, is_within, judge};
 use super::{Error, Jet, Report, Settings, Study};
 use crate::estimate::Estimate;
 use crate::observe::measure::{Contact, DamageCell, Grid, HalfSpace, Subsurface, Window};

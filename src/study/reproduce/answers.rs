@@ -1,4 +1,4 @@
-//! What a series of estimates says about a trend: yes, no, or that its errors are too wide to tell.
+//! What estimates say about a claim: yes, no, or that their errors are too wide to tell.
 
 use super::Report;
 use crate::estimate::Estimate;
