@@ -20,12 +20,12 @@ pub(super) const STUDY: Study = Study {
 /// A series of jets: grains, friction, restitutions (rising), copies.
 type Plan = (u64, f64, &'static [f64], u64);
 
-/// The paper has 10 000 grains. Below restitution 0.4 a grain in ten hits thousands of times, and what that brings has no meaning (see the finding
-/// on collapses).
+/// The paper has 10 000 grains. The lower the restitution and the more grains, the more hits: one jet of 10 000 at 0.4 has 400 000, and takes five times
+/// as long as at 0.8; it carries 5.4 E0.
 const FULL: [Plan; 4] = [
     (2000, 0.0, &[0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0], 4),
     (2000, 0.4, &[0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0], 4),
-    (10_000, 0.0, &[0.4, 0.6, 0.8, 1.0], 3),
+    (10_000, 0.0, &[0.5, 0.6, 0.8, 1.0], 3),
     (10_000, 0.4, &[0.6, 0.8, 1.0], 3),
 ];
 const QUICK: [Plan; 2] = [(2000, 0.0, &[0.4, 0.6, 0.8, 1.0], 4), (2000, 0.4, &[0.4, 0.6, 0.8, 1.0], 4)];
