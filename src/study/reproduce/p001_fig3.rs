@@ -1,4 +1,8 @@
 //! Paper 001, figures 3 to 5: the stress over targets of three sizes.
+//!
+//! Hard spheres in a plane, event-driven: packed jets of area fraction 0.8, restitution 0.8, friction 0.2 (`target_jet`). Contact stress is that of
+//! `[[measure]] kind = "flow"`, over the momentum flux rho U^2 of the jet, from a while after the front has arrived until the end of the jet is still four
+//! widths above the target. Contacts with the target are not in it.
 
 use super::ensemble::run_observed;
 use super::target_jet::{DIAMETER, Fit, TargetJet, all, copies, decide, is_above, length, note_set_up, rise};
@@ -19,7 +23,7 @@ pub(super) const STUDY: Study = Study {
 /// R* = D_tar / D_jet.
 const TARGETS: [f64; 3] = [4.0, 2.0, 1.0];
 /// Grains across the jet, and copies.
-const SIZE: (f64, u64) = (14.0, 10);
+const SIZE: (f64, u64) = (12.0, 10);
 const QUICK_SIZE: (f64, u64) = (9.0, 8);
 /// The layer in which the stress is looked at over the radius: from 2 to 3 diameters over the target.
 const LAYER: usize = 2;
