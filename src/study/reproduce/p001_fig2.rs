@@ -1,4 +1,8 @@
 //! Paper 001, figure 2: sheets of fine grains, fireworks of coarse ones; and whether elastic grains make a sheet.
+//!
+//! Packed planar jets (`target_jet`), as the simulations of the paper are planar, and round ones in space, as the experiment is. Friction 0.2 where
+//! nothing else is said. The paper asks whether elastic, frictionless grains form a sheet; Ellowitz et al. (2013) find the opening angle insensitive to
+//! dissipation. Both are looked at.
 
 use super::target_jet::{DIAMETER, Spray, Stream, TargetJet, is_above, note_set_up, rise, rises, run_sprays};
 use super::trend::all;

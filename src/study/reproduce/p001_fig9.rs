@@ -1,4 +1,7 @@
 //! Paper 001, figure 9: two jets head-on.
+//!
+//! Planar jets of grains at random places, area fraction 0.4, restitution 0.8, friction 0.2. A nozzle whose mouth is full waits: its grains are not pushed on
+//! by those behind, as they are in the tubes of the paper, where grains keep a uniform velocity.
 
 use nalgebra::Vector3;
 
