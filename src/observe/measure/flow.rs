@@ -112,6 +112,19 @@ impl Flow {
         self.summed_up(&self.sampled().map(of).collect::<Vec<_>>(), self.grid.cell_volume())
     }
 
+    /// What is known of all cells together whose middle (m) is `within`, if any is.
+    #[must_use]
+    pub fn region(&self, within: impl Fn(Vector3<f64>) -> bool) -> Option<FlowCell> {
+        let cells: Vec<usize> = (0..self.grid.len()).filter(|&cell| within(self.grid.centre(cell))).collect();
+        let of = |batch: &Batch| {
+            let mut sum = Cell::default();
+            cells.iter().for_each(|&cell| sum.add(&batch.cells[cell]));
+            (sum, batch.samples)
+        };
+        let volume = self.grid.cell_volume() * cells.len() as f64;
+        (!cells.is_empty()).then(|| self.summed_up(&self.sampled().map(of).collect::<Vec<_>>(), volume))
+    }
+
     /// Batches with samples in them: a batch that is shorter than the time between samples may have none.
     fn sampled(&self) -> impl Iterator<Item = &Batch> {
         self.batches.iter().filter(|batch| batch.samples > 0)
@@ -299,8 +312,14 @@ mod tests {
         approx::assert_relative_eq!(mass, ledger.inside().mass(), max_relative = 1e-13);
         approx::assert_relative_eq!(momentum, ledger.inside().momentum(), max_relative = 1e-12);
         assert!(energy > 0.0 && energy < ledger.inside().energy() * (1.0 + 1e-12));
+        let all = flow.region(|_| true).expect("cells");
+        let volume = JET.cell_volume() * JET.len() as f64;
         let inside: f64 = (0..JET.len()).map(|cell| flow.cell(cell).density.value * JET.cell_volume()).sum();
         assert!(inside > 0.0 && inside < mass, "some are outside the grid");
+        approx::assert_relative_eq!(all.density.value * volume, inside, max_relative = 1e-13);
+        assert!(all.density.error.is_finite() && flow.region(|_| false).is_none());
+        let below = flow.region(|place| place.z < 0.75).expect("cells");
+        assert!(below.density.value > all.density.value, "grains fall");
     }
 
     #[test]

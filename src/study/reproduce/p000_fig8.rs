@@ -26,7 +26,7 @@ const VANISHED: f64 = 0.02;
 const NEAR: f64 = 0.1;
 
 fn compute(settings: &Settings<'_>) -> Result<Report, Error> {
-    let (duration, copies) = if settings.quick { (1_200.0, 2) } else { (5_000.0, 4) };
+    let (duration, copies) = if settings.quick { (1_500.0, 2) } else { (5_000.0, 4) };
     let jet = |(angle, longer): (f64, f64)| Impinging { angle, duration: duration * longer, ..Impinging::slot() };
     let jets = run_copies(&ANGLES.map(jet), copies, settings)?;
     let mut report = Report::default();
