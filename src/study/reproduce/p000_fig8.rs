@@ -83,7 +83,10 @@ fn test_symmetry(jet: &Measured, report: &mut Report) {
     let flow = halves(|spot| spot.shear, -1.0);
     report.decide(
         "Shear at 0 degrees is positive where grains flow in the positive direction, and negative on the other side",
-        format!("the sum over one side less that over the other is {flow} of the sum of magnitudes (1 where no patch has the other sign)"),
+        format!(
+            "the sum over one side less that over the other is {:.3} of the sum of magnitudes (1 where no patch has the other sign)",
+            flow.value
+        ),
         Estimate { value: flow.value - 0.9, error: flow.error },
     );
 }
