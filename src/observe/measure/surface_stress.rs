@@ -290,14 +290,14 @@ impl SurfaceStress {
             (false, true) => "N/m",
             (false, false) => "Pa",
         };
-        let parts: [(&str, &str, fn(&PatchStress) -> Estimate, f64); 2] = [
+        let parts: [Part; 2] = [
             ("normal", "Normal stress", |stress| stress.normal, pressure),
             ("shear", "Shear stress", |stress| stress.shear, shear),
         ];
         let shows = format!("Averaged from {} to {} s; {unit}", self.window.from, self.window.until);
         let x = Axis::length("along / m", -0.5 * length, 0.5 * length);
         if columns.iter().all(|column| column.len() == 1) {
-            let line = |(colour, (_, name, of, scale)): (usize, &(&str, &str, fn(&PatchStress) -> Estimate, f64))| {
+            let line = |(colour, (_, name, of, scale)): (usize, &Part)| {
                 let at = |index: usize| (index as f64 + 0.5) * length / columns.len() as f64 - 0.5 * length;
                 let points = columns.iter().enumerate();
                 let points = points.map(|(index, column)| (at(index), of(&stresses[column[0]]) * scale.recip()));
@@ -309,7 +309,7 @@ impl SurfaceStress {
             let title = "Stress on the surface".into();
             return vec![Picture::Chart(Chart { name: "stress", title, shows, x, y, lines })];
         }
-        let map = |(name, title, of, scale): (&'static str, &str, fn(&PatchStress) -> Estimate, f64)| {
+        let map = |(name, title, of, scale): Part| {
             let value = |&patch: &usize| of(&stresses[patch]).value / scale;
             let columns: Vec<Vec<Option<f64>>> =
                 columns.iter().map(|column| column.iter().map(|patch| Some(value(patch))).collect()).collect();
@@ -332,6 +332,9 @@ impl SurfaceStress {
         parts.into_iter().filter_map(map).collect()
     }
 }
+
+/// A part of the stress: name, title, what it is, and what it is shown relative to.
+type Part = (&'static str, &'static str, fn(&PatchStress) -> Estimate, f64);
 
 /// The range that holds all points of some lines and 0, with a margin.
 fn range(lines: &[Line]) -> [f64; 2] {

@@ -13,6 +13,7 @@ use super::{
     Area, BLUE, Drawn, FAINT, FINE, FRAME, GREEN, HEADING, INK, MUTED, ORANGE, PURPLE, Palette, SKY, colour_bar, fine,
     part, picture, style, tick, write,
 };
+use crate::estimate::Estimate;
 use crate::shown::{Axis, Line, Map, Mark, Picture, Scale};
 
 /// Of a chart with its key, pixels.
@@ -44,7 +45,7 @@ pub fn drawn(of: &Picture) -> io::Result<String> {
         Picture::Chart(chart) => picture(CHART, &chart.title, &chart.shows, |area| {
             let plane = part(area, [10, HEADING, KEY - 20, CHART[1] - HEADING - 10]);
             let mut plane = axes(&plane, [&chart.x, &chart.y], [8, 8], true)?;
-            chart.lines.iter().try_for_each(|line| draw_line(&mut plane, line, &chart.y))?;
+            chart.lines.iter().try_for_each(|line| draw_line(&mut plane, line, [&chart.x, &chart.y]))?;
             draw_key(area, &chart.lines)
         }),
         Picture::Map(map) => {
@@ -122,12 +123,13 @@ fn axes<'a>(area: &Area<'a>, [x, y]: [&Axis; 2], labels: [usize; 2], lines: bool
     Ok(plane)
 }
 
-fn draw_line(plane: &mut Plane<'_>, line: &Line, y: &Axis) -> Drawn {
+fn draw_line(plane: &mut Plane<'_>, line: &Line, [x, y]: [&Axis; 2]) -> Drawn {
     let (colour, stroke) = stroke(line);
     let clip = |value: f64| value.clamp(y.range[0], y.range[1]);
     // What lies outside is not drawn: it would lie on the frame.
-    let inside = |value: f64| (y.range[0]..=y.range[1]).contains(&value);
-    for piece in line.points.split(|(_, at)| !inside(at.value)).filter(|piece| !piece.is_empty()) {
+    let within = |axis: &Axis, value: f64| (axis.range[0]..=axis.range[1]).contains(&value);
+    let inside = |at: &(f64, Estimate)| within(x, at.0) && within(y, at.1.value);
+    for piece in line.points.split(|at| !inside(at)).filter(|piece| !piece.is_empty()) {
         let path: Vec<(f64, f64)> = piece.iter().map(|(x, at)| (*x, at.value)).collect();
         if matches!(line.mark, Mark::OpenPoints | Mark::Dashed) {
             plane.draw_series(DashedLineSeries::new(path, fine(6), fine(4), stroke))?;
@@ -138,7 +140,7 @@ fn draw_line(plane: &mut Plane<'_>, line: &Line, y: &Axis) -> Drawn {
     if !matches!(line.mark, Mark::Points | Mark::OpenPoints) {
         return Ok(());
     }
-    for (x, at) in line.points.iter().filter(|(_, at)| inside(at.value)) {
+    for (x, at) in line.points.iter().filter(|at| inside(at)) {
         if at.error > 0.0 {
             let ends = [clip(at.value - at.error), clip(at.value + at.error)];
             plane.draw_series([PathElement::new(ends.map(|end| (*x, end)), colour.stroke_width(fine(1)))])?;
@@ -240,12 +242,12 @@ fn draw_map(area: &Area<'_>, map: &Map, [width, height]: [i32; 2]) -> Drawn {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimate::Estimate;
     use crate::shown::Chart;
 
     #[test]
     fn a_chart_shows_its_error_bars_and_leaves_out_what_is_outside() {
-        let points = [(1.0, 0.5), (10.0, 0.7), (100.0, 2.0)].map(|(x, value)| (x, Estimate { value, error: 0.1 }));
+        let points =
+            [(0.1, 0.5), (1.0, 0.5), (10.0, 0.7), (100.0, 2.0)].map(|(x, value)| (x, Estimate { value, error: 0.1 }));
         let chart = |mark| {
             Picture::Chart(Chart {
                 name: "chart",

@@ -23,6 +23,11 @@ pub(super) const PER_WIDTH: u32 = 8;
 /// A jet is measured after it has flown its width so many times: later, stresses do not drift.
 const SETTLE: f64 = 30.0;
 
+/// Breadth of a sine surface, in diameters. The diagonal by which a piece of it is two triangles must run along y to within
+/// [`LARGEST_SLOPE`](crate::surface::LARGEST_SLOPE): once in some million hits, when the contact that was predicted with a face is lost by rounding, the engine takes
+/// the nearest point of the triangle for the contact, and that may be on its diagonal.
+const BREADTH: f64 = 2e4;
+
 /// What the nozzle is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outline {
@@ -154,7 +159,7 @@ impl Impinging {
         format!(
             "kind = \"sine\"\ncentre = [0, 0, 0]\nsize = [{:?}, {:?}]\namplitude = {:?}\nwavelength = {:?}\npieces = 16",
             2.0 * self.reach * width + 4.0 * DIAMETER,
-            10.0 * DIAMETER,
+            BREADTH * DIAMETER,
             amplitude * width,
             width / number
         )
@@ -169,7 +174,8 @@ impl Impinging {
         let [sin, cos] = [self.angle.to_radians().sin(), self.angle.to_radians().cos()];
         let unit = DIAMETER / self.speed;
         let from = SETTLE * self.width * unit;
-        let (x, z) = (self.distance * width * sin, self.distance * width * cos);
+        // The axis is aimed at where centres are when grains hit, a radius above the surface.
+        let (x, z) = (self.distance * width * sin, self.distance * width * cos + 0.5 * DIAMETER);
         let right = (self.reach * width).max(x + 0.5 * width * cos + 2.0 * DIAMETER);
         let top = (3.0 * width).max(z + 0.5 * width * sin + 2.0 * DIAMETER);
         let low = self.asperities[1] * width + 2.0 * DIAMETER;

@@ -2,7 +2,7 @@
 //!
 //! A study is a file here (named after the paper's number and its figure) and a line in [`STUDIES`]. It gets [`Settings`] and gives a [`Report`]; it reads no file and writes none.
 //! What studies share: [`run_all`] (many runs on all cores, in a fixed order), [`Estimate`](crate::estimate::Estimate) (a mean and how sure it is),
-//! [`shown`](crate::shown) (tables and pictures as data), [`Jet`] (the reference jet), `target_jet` (a jet on a target of about its own width), `trend` (whether a series falls, beyond its
+//! [`shown`](crate::shown) (tables and pictures as data), [`Jet`] (the reference jet), `target_jet` (a jet on a target of about its own width), `Impinging` (the jets of Arbelaez et al. 2009), `trend` (whether a series falls, beyond its
 //! errors) and [`Sequence`] (two grains and a wall, in closed form).
 
 mod arrivals;

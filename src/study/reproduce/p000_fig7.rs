@@ -16,10 +16,10 @@ pub(super) const STUDY: Study = Study {
 };
 
 /// Energy of repulsion at the mean distance over kinetic energy, without and with a near field.
-const STRENGTHS: [f64; 5] = [0.0, 0.01, 0.03, 0.06, 0.1];
-const QUICK_STRENGTHS: [f64; 3] = [0.0, 0.03, 0.1];
-const ATTRACTING: [f64; 4] = [0.0, 0.003, 0.006, 0.01];
-const QUICK_ATTRACTING: [f64; 2] = [0.0, 0.01];
+const STRENGTHS: [f64; 6] = [0.0, 0.002, 0.005, 0.01, 0.03, 0.06];
+const QUICK_STRENGTHS: [f64; 4] = [0.0, 0.005, 0.01, 0.03];
+const ATTRACTING: [f64; 4] = [0.0, 0.002, 0.005, 0.01];
+const QUICK_ATTRACTING: [f64; 3] = [0.0, 0.005, 0.01];
 /// Distances of equilibrium in mean distances of the grains: far outside, all that are near repel; inside, they attract.
 const REPELLING_AT: f64 = 8.0;
 const ATTRACTING_AT: f64 = 0.5;

@@ -1,7 +1,7 @@
 //! Paper 000, figures 9 to 11: stress over the speed, the volume fraction and the restitution of the surface.
 
-use super::impinging::{Impinging, Measured, Spot, mean, run_copies};
-use super::trend::{Trend, difference};
+use super::impinging::{Impinging, Measured, PER_WIDTH, Spot, mean, peak, run_copies};
+use super::trend::{Trend, difference, listed};
 use super::{Error, Report, Settings, Study};
 use crate::estimate::Estimate;
 use crate::shown::{Axis, Chart, Line, Picture, Table};
@@ -127,28 +127,34 @@ fn compute_10(settings: &Settings<'_>) -> Result<Report, Error> {
             let half = jet.jet.half_footprint();
             jet.derived(|spots| {
                 // A patch that the edge divides has its part of the wave.
-                let wave = |spot: &Spot| {
-                    ((half - spot.x.abs()) * f64::from(super::impinging::PER_WIDTH) + 0.5).clamp(0.0, 1.0)
-                };
+                let wave = |spot: &Spot| ((half - spot.x.abs()) * f64::from(PER_WIDTH) + 0.5).clamp(0.0, 1.0);
                 let off: f64 = spots.iter().map(|spot| (spot.normal - wave(spot)).abs()).sum();
                 off / spots.iter().map(wave).sum::<f64>()
             })
         }),
         Trend::Falls,
     );
+    let half = |jet: &Measured| jet.jet.half_footprint();
     report.claim_trend(
-        "and the outer quarters of the footprint bear more of what the middle half bears",
+        "and it is less peaked: the peak over half a width falls relative to the mean on the footprint",
         &over(&|jet| {
-            let half = jet.jet.half_footprint();
+            let half = half(jet);
             jet.derived(|spots| {
-                let of = |low: f64, high: f64| {
-                    mean(spots, |spot| (low * half..high * half).contains(&spot.x.abs()), |spot| spot.normal)
-                };
-                of(0.5, 0.9) / of(0.0, 0.5)
+                peak(spots, |spot| spot.normal) / mean(spots, |spot| spot.x.abs() < half, |spot| spot.normal)
             })
         }),
-        Trend::Rises,
+        Trend::Falls,
     );
+    let edges = over(&|jet| {
+        let half = half(jet);
+        jet.derived(|spots| {
+            let of = |low: f64, high: f64| {
+                mean(spots, |spot| (low * half..high * half).contains(&spot.x.abs()), |spot| spot.normal)
+            };
+            of(0.5, 0.9) / of(0.0, 0.5)
+        })
+    });
+    report.measured("Normal stress on the outer parts of the footprint over that on its middle half", listed(&edges));
     show(&mut report, &jets, "fraction", fractions, "");
     Ok(report)
 }
