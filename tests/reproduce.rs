@@ -84,6 +84,15 @@ fn every_quick_study_leaves_numbers_pictures_and_a_verdict() {
             assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>") && !svg.contains("NaN"), "{name}");
         }
     }
+    // One is missing: it alone is computed again, and the page is what it was.
+    fs::remove_dir_all(target.join("002-fig4")).expect("it was there");
+    let resumed = output(&["all", "--quick", "--resume"], Some(&target));
+    assert!(resumed.status.success(), "{}", text(&resumed.stderr));
+    assert_eq!(text(&resumed.stdout).matches("Verdict: ").count(), 1);
+    assert_eq!(names(&target), expected);
+    assert_eq!(fs::read_to_string(home.path().join("studies.md")).expect("it is there"), page);
+    let of_another_seed = output(&["all", "--quick", "--resume", "--seed", "2"], Some(&target));
+    assert_eq!(of_another_seed.status.code(), Some(2), "what is there is not what is asked for");
 }
 
 #[test]

@@ -4,26 +4,30 @@ use std::fmt;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::tables::table;
 use super::{Error, Folder, plots};
 use crate::shown::Picture;
 use crate::study::reproduce::{Finding, Report, Study, Verdict};
 
+/// The file that programs read.
+const SUMMARY: &str = "summary.json";
+const VERSION: &str = env!("CARGO_PKG_VERSION");
+
 /// The verdict of a study: on the terminal, in `verdict.md` and in `summary.json`.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Reproduction {
     /// Name of the study.
-    pub study: &'static str,
+    pub study: String,
     /// What it is about.
-    pub title: &'static str,
+    pub title: String,
     /// Who states it, and where.
-    pub source: &'static str,
+    pub source: String,
     /// What is stated.
-    pub statement: &'static str,
+    pub statement: String,
     /// Version of Impinge.
-    pub version: &'static str,
+    pub version: String,
     /// Whether runs were fewer and smaller.
     pub quick: bool,
     /// Seed of the first run.
@@ -32,6 +36,8 @@ pub struct Reproduction {
     pub verdict: Verdict,
     /// Each claim and what it comes to.
     pub findings: Vec<Finding>,
+    /// File and title of each picture.
+    pub pictures: Vec<[String; 2]>,
 }
 
 impl Reproduction {
@@ -39,17 +45,30 @@ impl Reproduction {
     #[must_use]
     pub fn new(study: &Study, quick: bool, seed: u64, report: &Report) -> Self {
         let Study { name, title, source, statement, .. } = study;
+        let picture = |picture: &Picture| [format!("pictures/{}.svg", picture.name()), picture.title().to_owned()];
+        let [study, title, source, statement] = [name, title, source, statement].map(|text| (*text).to_owned());
         Self {
-            study: name,
+            study,
             title,
             source,
             statement,
-            version: env!("CARGO_PKG_VERSION"),
+            version: VERSION.to_owned(),
             quick,
             seed,
             verdict: report.verdict(),
             findings: report.findings.clone(),
+            pictures: report.pictures.iter().map(picture).collect(),
         }
+    }
+
+    /// What `folder` holds of this study, if it is complete and of the same version, extent and seed.
+    #[must_use]
+    pub fn known(study: &Study, quick: bool, seed: u64, folder: &Path) -> Option<Self> {
+        let text = std::fs::read_to_string(folder.join(SUMMARY)).ok()?;
+        let known: Self = serde_json::from_str(&text).ok()?;
+        let same = (known.study.as_str(), known.version.as_str(), known.quick, known.seed)
+            == (study.name, VERSION, quick, seed);
+        same.then_some(known)
     }
 
     /// Writes everything into `folder` and gives it its name.
@@ -58,7 +77,7 @@ impl Reproduction {
     /// What could not be written, or those of [`Folder::finish`].
     pub fn write(&self, report: &Report, folder: Folder) -> Result<PathBuf, Error> {
         folder.write("verdict.md", |file| write!(file, "{self}"))?;
-        folder.write("summary.json", |file| {
+        folder.write(SUMMARY, |file| {
             serde_json::to_writer_pretty(&mut *file, self)?;
             writeln!(file)
         })?;
@@ -96,8 +115,7 @@ pub struct Overview {
     page: PathBuf,
     /// The folder of their folders, as the page calls it.
     folder: String,
-    /// What each study found, and file and title of its pictures.
-    studies: Vec<(Reproduction, Vec<[String; 2]>)>,
+    studies: Vec<Reproduction>,
 }
 
 impl Overview {
@@ -120,9 +138,8 @@ impl Overview {
     ///
     /// # Errors
     /// [`Error::Write`].
-    pub fn add(&mut self, study: Reproduction, report: &Report) -> Result<(), Error> {
-        let picture = |picture: &Picture| [format!("{}.svg", picture.name()), picture.title().to_owned()];
-        self.studies.push((study, report.pictures.iter().map(picture).collect()));
+    pub fn add(&mut self, study: Reproduction) -> Result<(), Error> {
+        self.studies.push(study);
         let failed = |source| Error::Write { path: self.page.clone(), source };
         let beside = self.page.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let mut file = tempfile::NamedTempFile::new_in(beside).map_err(failed)?;
@@ -140,26 +157,26 @@ impl Overview {
 
 impl fmt::Display for Overview {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Some((first, _)) = self.studies.first() else { return Ok(()) };
+        let Some(first) = self.studies.first() else { return Ok(()) };
         let quick = if first.quick { " --quick" } else { "" };
         writeln!(f, "# What papers state, put to the test\n")?;
         writeln!(f, "Written by `impinge reproduce all{quick} --seed {}`, Impinge {}.\n", first.seed, first.version)?;
         writeln!(f, "| study | what it is about | agrees | differs | undecided |\n|---|---|---|---|---|")?;
-        for (study, _) in &self.studies {
+        for study in &self.studies {
             let count = |verdict| study.findings.iter().filter(|finding| finding.verdict == verdict).count();
             let [agrees, differs, undecided] = [Verdict::Agrees, Verdict::Differs, Verdict::Undecided].map(count);
-            let (name, title) = (study.study, cell(study.title));
+            let (name, title) = (&study.study, cell(&study.title));
             writeln!(f, "| [{name}](#{}) | {title} | {agrees} | {differs} | {undecided} |", anchor(name))?;
         }
-        for (study, pictures) in &self.studies {
-            writeln!(f, "\n<a id=\"{}\"></a>\n\n## {}: {}\n", anchor(study.study), study.study, study.title)?;
+        for study in &self.studies {
+            writeln!(f, "\n<a id=\"{}\"></a>\n\n## {}: {}\n", anchor(&study.study), study.study, study.title)?;
             writeln!(f, "{}: {}\n", study.source, study.statement)?;
             writeln!(f, "| claim | measured | verdict |\n|---|---|---|")?;
             for Finding { claim, measured, verdict } in &study.findings {
                 writeln!(f, "| {} | {} | {verdict} |", cell(claim), cell(measured))?;
             }
-            for [file, title] in pictures {
-                writeln!(f, "\n![{title}]({}/{}/pictures/{file})", self.folder, study.study)?;
+            for [file, title] in &study.pictures {
+                writeln!(f, "\n![{title}]({}/{}/{file})", self.folder, study.study)?;
             }
         }
         Ok(())

@@ -42,7 +42,7 @@ impl Report {
 }
 
 /// A claim, and what was measured, with its uncertainty.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Finding {
     /// What is claimed; or what was measured, where nothing is.
     pub claim: String,
@@ -53,7 +53,7 @@ pub struct Finding {
 }
 
 /// What a claim comes to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// It is as claimed.
