@@ -27,7 +27,7 @@ const FULL: [Plan; 5] = [
     (2000, 0.2, &[0.4, 0.5, 0.6, 0.8, 1.0], 4),
     (2000, 0.4, &[0.4, 0.5, 0.6, 0.8, 1.0], 4),
     (10_000, 0.0, &[0.4, 0.6, 0.8], 3),
-    (10_000, 0.4, &[0.6, 0.8], 3),
+    (10_000, 0.4, &[0.8], 3),
 ];
 const QUICK: [Plan; 2] = [(2000, 0.0, &[0.3, 0.6, 0.8], 4), (2000, 0.4, &[0.4, 0.6, 0.8], 4)];
 /// Restitutions from here on are high, up to there low.
@@ -150,9 +150,10 @@ fn test_signs(points: &[Point], report: &mut Report) {
         told(low(), Point::alpha),
         all(low().map(|point| is_below(zero, point.alpha()))),
     );
-    let elastic = || points.iter().filter(|point| (point.jet.restitution, point.jet.friction) == (1.0, 0.0));
-    if elastic().next().is_some() {
-        report.measured("alpha_interf of elastic and smooth grains, which lose nothing", told(elastic(), Point::alpha));
+    let elastic = points.iter().find(|point| (point.jet.restitution, point.jet.friction) == (1.0, 0.0));
+    if let Some(elastic) = elastic {
+        let what = "alpha_interf of elastic and smooth grains, which lose nothing (rounding)";
+        report.measured(what, format!("{:.1e} ({})", elastic.alpha().value, elastic.name()));
     }
 }
 
