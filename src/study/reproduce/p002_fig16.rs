@@ -141,15 +141,18 @@ fn test_signs(points: &[Point], report: &mut Report) {
         told(high(), Point::alpha),
         all(high().map(|point| is_below(point.alpha(), zero))),
     );
-    let low = || points.iter().filter(|point| point.jet.restitution <= LOW);
-    judge(
-        report,
-        format!(
-            "alpha_interf > 0 at low restitution (up to e = {LOW}): there is more energy left than without interference"
-        ),
-        told(low(), Point::alpha),
-        all(low().map(|point| is_below(zero, point.alpha()))),
-    );
+    for (name, rough) in [("without", false), ("with", true)] {
+        let is_low = |point: &&Point| point.jet.restitution <= LOW && (point.jet.friction > 0.0) == rough;
+        let low = || points.iter().filter(is_low);
+        judge(
+            report,
+            format!(
+                "alpha_interf > 0 at low restitution (up to e = {LOW}) {name} friction: there is more energy left than without interference"
+            ),
+            told(low(), Point::alpha),
+            all(low().map(|point| is_below(zero, point.alpha()))),
+        );
+    }
     let elastic = points.iter().find(|point| (point.jet.restitution, point.jet.friction) == (1.0, 0.0));
     if let Some(elastic) = elastic {
         let what = "alpha_interf of elastic and smooth grains, which lose nothing (rounding)";
@@ -171,7 +174,8 @@ fn test_what_is_trapped(points: &[Point], report: &mut Report) {
     judge(
         report,
         format!(
-            "Where alpha_interf > 0, it is that of slow grains trapped near the surface: their energy is lost in the end (most of what is left at {:.0} ms is gone at 500 ms)",
+            "Where alpha_interf > 0, it is that of slow grains trapped near the surface: their energy is lost in the end (most of what is \
+             left at {:.0} ms is gone at 500 ms)",
             1e3 * ARRIVED
         ),
         format!("kept of the energy at {:.0} ms: {}", 1e3 * ARRIVED, told(positive(), kept)),
