@@ -13,7 +13,8 @@ pub fn triaxiality(stress: &Stress, poisson_ratio: f64) -> f64 {
     2.0 / 3.0 * (1.0 + poisson_ratio) + 3.0 * (1.0 - 2.0 * poisson_ratio) * ratio * ratio
 }
 
-/// sigma_eq = sigma_vm √R_v (eq. 31), Pa, as √(2/3 (1 + nu) sigma_vm² + 3 (1 - 2 nu) sigma_H²), which knows no 0/0. Compression counts as tension does.
+/// sigma_eq = sigma_vm √R_v (eq. 31), Pa, as √(2/3 (1 + nu) sigma_vm² + 3 (1 - 2 nu) sigma_H²), which knows no 0/0. Compression counts as tension
+/// does.
 #[inline]
 #[must_use]
 pub fn equivalent_stress(stress: &Stress, poisson_ratio: f64) -> f64 {
@@ -23,7 +24,8 @@ pub fn equivalent_stress(stress: &Stress, poisson_ratio: f64) -> f64 {
         .sqrt()
 }
 
-/// Pi = (sigma_eq - sigma_0 + |sigma_eq - sigma_0|) / (2 sigma_0) (eq. 32): by how much a stress (Pa) is above a threshold (Pa), over the threshold; 0 below.
+/// Pi = (sigma_eq - sigma_0 + |sigma_eq - sigma_0|) / (2 sigma_0) (eq. 32): by how much a stress (Pa) is above a threshold (Pa), over the
+/// threshold; 0 below.
 #[inline]
 #[must_use]
 pub fn damage_indicator(equivalent: f64, threshold: f64) -> f64 {

@@ -45,8 +45,8 @@ impl Stress {
 ///
 /// A = 1/(ρ (ρ + z)), B = (2ρ + z)/(ρ³ (ρ + z)²), S = 1/(ρ (ρ + z)²), C = 1/(ρ³ (ρ + z)²) + 2/(ρ² (ρ + z)³).
 ///
-/// Departures from the print: eq. (56) gives σ_zz of a tangential force as -3 x² z F/(2π ρ⁵), a copy of (58); it is -3 x z² F/(2π ρ⁵), without which
-/// there is no equilibrium and a tangential force would press the solid down. And 1/r² - z/(ρ r²) of (49) and (50), which is 0/0 on the axis, is
+/// Departures from the print: eq. (56) gives σ_zz of a tangential force as -3 x² z F/(2π ρ⁵), a copy of (58); it is -3 x z² F/(2π ρ⁵), without
+/// which there is no equilibrium and a tangential force would press the solid down. And 1/r² - z/(ρ r²) of (49) and (50), which is 0/0 on the axis, is
 /// written as the A that it equals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointLoad {

@@ -8,12 +8,12 @@ use crate::scene::{Scene, SurfaceEnergyMeasure};
 use crate::scheme::{GrainCollision, Kick, Observer, Passage, Rest, SurfaceHit};
 use crate::shown::{Axis, Chart, Line, Mark, Picture, Table};
 
-/// alpha_interf = E_f/E_0 - e² (Mukherjee & Zohdi 2015, eq. 47): the part of the energy that a jet still has when all is over, less what it would have if its
-/// grains hit the surface once each and never each other.
+/// alpha_interf = E_f/E_0 - e² (Mukherjee & Zohdi 2015, eq. 47): the part of the energy that a jet still has when all is over, less what it would
+/// have if its grains hit the surface once each and never each other.
 ///
-/// Above 0 more energy is left than without interference, below 0 less. The paper calls the first slow grains that are trapped, the second shielding; but
-/// energy that is trapped is lost in the end, and shielding alone would leave more. Where a run is stopped before all grains have hit, what they
-/// still bring counts as left.
+/// Above 0 more energy is left than without interference, below 0 less. The paper takes the first for slow grains that are trapped near the surface.
+/// Jets of smooth grains of low restitution do have it, but there it is energy of motion along the surface, which is kept for good (the study
+/// `002-fig16`). Where a run is stopped before all grains have hit, what they still bring counts as left.
 ///
 /// ```
 /// use impinge::observe::measure::interference_parameter;
@@ -28,8 +28,8 @@ pub fn interference_parameter(left_over_e0: f64, restitution: f64) -> f64 {
 
 /// Energy to the surface, batch by batch, by hit order, along the normal and along the surface.
 ///
-/// The same energy counts again each time a grain brings it back. Mean powers have the standard errors of the scatter of the batches: right where the jet is
-/// steady, and too large where it comes and goes.
+/// The same energy counts again each time a grain brings it back. Mean powers have the standard errors of the scatter of the batches: right where
+/// the jet is steady, and too large where it comes and goes.
 #[derive(Clone, Debug)]
 pub struct EnergyInTime {
     window: Window,

@@ -115,7 +115,8 @@ fn compute(settings: &Settings<'_>) -> Result<Report, Error> {
     Ok(report)
 }
 
-/// Can the block be made at all? (PHYSICS: whole grains in the box would have a volume fraction of 0.419, beyond the 0.384 at which random places run out.)
+/// Can the block be made at all? (PHYSICS 2.24: whole grains in the box would have a volume fraction of 0.419, beyond the 0.384 at which random
+/// places run out.)
 fn test_block(settings: &Settings<'_>, report: &mut Report) {
     let with = |inside: Inside| {
         let mut scene = scene(&Jet { seed: settings.seed, ..jet(MANY) });
