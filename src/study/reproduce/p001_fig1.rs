@@ -155,7 +155,7 @@ fn fine(fine: &[&Spray], coarse: &[&Spray], report: &mut Report) {
 /// Eq. (9), which follows from (6) to (8) in two dimensions only, and only if a target without end stops the jet, 2 sigma_0 R_jet / (C Q) = U_0, which the
 /// paper does not say.
 fn velocity(name: &str, sprays: &[&Spray], report: &mut Report) {
-    let left = |spray: &Spray| spray.mean(|ejected| ejected.along.value) * super::target_jet::SPEED.recip();
+    let left = |spray: &Spray| spray.mean(|ejected| ejected.along) * super::target_jet::SPEED.recip();
     // Where next to nothing is left its logarithm is lost in the errors.
     let known: Vec<(f64, Estimate)> = sprays
         .iter()
@@ -204,8 +204,8 @@ fn table(sprays: &[Spray]) -> Table {
     );
     for spray in sprays {
         let [opening, half] = [spray.opening_angle(), spray.half_mass_angle()];
-        let median = spray.mean(|ejected| ejected.median_angle.value);
-        let [along, across] = [spray.mean(|ejected| ejected.along.value), spray.mean(|ejected| ejected.across.value)];
+        let median = spray.mean(|ejected| ejected.median_angle);
+        let [along, across] = [spray.mean(|ejected| ejected.along), spray.mean(|ejected| ejected.across)];
         table.row(&[
             &format!("{:?}", spray.jet.stream).to_lowercase(),
             &spray.jet.target,
