@@ -3,7 +3,9 @@
 //! Planar jets (`target_jet`), as the simulations of the paper are planar; restitution 0.8, friction 0.2. The paper compares its targets of 3, 2 and 1 jet
 //! widths with those of 2, 1.62 and 0.88 of the experiment; all are here.
 
-use super::target_jet::{DEVIATIONS, DIAMETER, Fit, Spray, Stream, TargetJet, ideal_angle, is_above, note_set_up, rise, rises, run_sprays};
+use super::target_jet::{
+    DEVIATIONS, DIAMETER, Fit, Spray, Stream, TargetJet, ideal_angle, is_above, note_set_up, rise, rises, run_sprays,
+};
 use super::trend::all;
 use super::{Error, Report, Settings, Study};
 use crate::estimate::{Estimate, Slope};
@@ -150,7 +152,7 @@ fn fine(fine: &[&Spray], coarse: &[&Spray], report: &mut Report) {
 /// Eq. (9), which follows from (6) to (8) in two dimensions only, and only if a target without end stops the jet, 2 sigma_0 R_jet / (C Q) = U_0, which the
 /// paper does not say.
 fn velocity(name: &str, sprays: &[&Spray], report: &mut Report) {
-    let left = |spray: &Spray| spray.mean(|ejected| ejected.along.value) * super::target_jet::SPEED.recip();
+    let left = |spray: &Spray| spray.mean(|ejected| ejected.along) * super::target_jet::SPEED.recip();
     // Where next to nothing is left its logarithm is lost in the errors.
     let known: Vec<(f64, Estimate)> = sprays
         .iter()
@@ -197,8 +199,8 @@ fn table(sprays: &[Spray]) -> Table {
     );
     for spray in sprays {
         let [opening, half] = [spray.opening_angle(), spray.half_mass_angle()];
-        let median = spray.mean(|ejected| ejected.median_angle.value);
-        let [along, across] = [spray.mean(|ejected| ejected.along.value), spray.mean(|ejected| ejected.across.value)];
+        let median = spray.mean(|ejected| ejected.median_angle);
+        let [along, across] = [spray.mean(|ejected| ejected.along), spray.mean(|ejected| ejected.across)];
         table.row(&[
             &format!("{:?}", spray.jet.stream).to_lowercase(),
             &spray.jet.target,

@@ -177,7 +177,7 @@ fn table(sprays: &[Spray]) -> Table {
     );
     for spray in sprays {
         let [half, opening] = [spray.half_mass_angle(), spray.opening_angle()];
-        let across = spray.mean(|ejected| ejected.across.value);
+        let across = spray.mean(|ejected| ejected.across);
         table.row(&[
             &format!("{:?}", spray.jet.stream).to_lowercase(),
             &spray.jet.restitution,

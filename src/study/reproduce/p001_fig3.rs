@@ -32,11 +32,9 @@ const QUICK_SIZE: (f64, u64) = (9.0, 8);
 const LAYER: usize = 2;
 /// What differs by less than this part is alike.
 const CLOSE: f64 = 0.2;
-/// The constants of an exponential inside and outside may differ by this part of that over all and still be called one; those of a Gauss curve differ by
-/// all of it. A misfit alone tells little where the stress falls by a factor of two only.
+/// The constants of an exponential inside and outside, or the slopes of a line low and high, may differ by this part of that over all and still be
+/// called one; the constants of a Gauss curve differ by all of it. A misfit alone tells little where the stress falls by a factor of two only.
 const BENT: f64 = 0.5;
-/// A line may miss the stress by this part of the largest (root mean square) and still be called straight.
-const STRAIGHT: f64 = 0.1;
 /// Up to where the stress has fallen to this part of the largest its fall with height is looked at.
 const TOP: f64 = 0.1;
 /// Names and titles of the maps.
@@ -114,14 +112,12 @@ impl Over {
         1..top.map_or(2, |top| top + 1)
     }
 
-    fn fall(&self, column: usize) -> (Fit, Points) {
-        let rows = self.rows(column);
+    /// The radial stress in a column over h / R_jet, in some rows, which weigh alike.
+    fn fall(&self, column: usize, rows: Range<usize>) -> Fit {
         let points = |at: &At<'_>| -> Points {
-            // Rows weigh alike.
             rows.clone().map(|row| (self.height(row), Estimate { error: 1.0, ..at(column, row) })).collect()
         };
-        let measured = rows.clone().map(|row| (self.height(row), self.mean(column, row, 0))).collect();
-        (self.fitted(points, 0), measured)
+        self.fitted(points, 0)
     }
 }
 
@@ -171,16 +167,10 @@ fn compute(settings: &Settings<'_>) -> Result<Report, Error> {
     Ok(report)
 }
 
-/// Whether a root mean square deviation is below a bound; unknown where it is above but the errors of the points would make it so.
-fn is_straight(misfit: f64, noise: f64, bound: f64) -> Option<bool> {
-    if misfit < bound {
-        return Some(true);
-    }
-    ((misfit.powi(2) - noise.powi(2)).max(0.0).sqrt() > bound).then_some(false)
-}
-
-fn noise(points: &[(f64, Estimate)]) -> f64 {
-    (points.iter().map(|(_, at)| at.error.powi(2)).sum::<f64>() / points.len() as f64).sqrt()
+/// Whether slopes inside and outside are one, as far as [`BENT`] goes.
+fn is_straight(inner: Estimate, outer: Estimate, all: Estimate) -> Option<bool> {
+    let bend = rise(inner, outer);
+    is_above(Estimate { value: bend.value.abs(), ..bend }, BENT * all.value.abs()).map(|above| !above)
 }
 
 fn exponential(over: &[Over], report: &mut Report) {
@@ -190,8 +180,6 @@ fn exponential(over: &[Over], report: &mut Report) {
             let fit = over.exponential(part, 0..columns);
             let [inner, outer] =
                 [0..columns / 2, columns / 2..columns].map(|half| over.exponential(part, half).slope * -1.0);
-            let bend = rise(inner, outer);
-            let bound = BENT * fit.slope.value.abs();
             let [first, last] = [0, columns - 1].map(|column| over.mean(column, LAYER, part));
             report.judge(format!(
                     "D_tar / D_jet = {}: the {name} stress falls exponentially with the radius, with one C inside and outside (within {:.0} %)",
@@ -204,7 +192,7 @@ fn exponential(over: &[Over], report: &mut Report) {
                     fit.slope * -1.0,
                     100.0 * fit.misfit
                 ),
-                is_above(Estimate { value: bend.value.abs(), ..bend }, bound).map(|above| !above),
+                is_straight(inner, outer, fit.slope),
             );
         }
     }
@@ -263,21 +251,25 @@ fn linear(over: &[Over], report: &mut Report) {
     let mut slopes: [Vec<(f64, Estimate)>; 2] = Default::default();
     for over in over {
         for (number, (column, name)) in places(over).into_iter().enumerate() {
-            let (fit, points) = over.fall(column);
-            let most = points.iter().map(|(_, stress)| stress.value).fold(0.0, f64::max);
+            let rows = over.rows(column);
+            let middle = (rows.start + rows.end) / 2;
+            let fit = over.fall(column, rows.clone());
+            let [low, high] = [rows.start..middle, middle..rows.end].map(|half| over.fall(column, half).slope);
+            let most = rows.clone().map(|row| over.mean(column, row, 0).value).fold(0.0, f64::max);
             slopes[number].push((over.jet.target, fit.slope));
             report.judge(format!(
-                    "D_tar / D_jet = {}: at r / R_jet = {name} the radial stress falls linearly with height, within {:.0} % of the largest",
+                    "D_tar / D_jet = {}: at r / R_jet = {name} the radial stress falls linearly with height, with one slope low and high (within {:.0} %)",
                     over.jet.target,
-                    100.0 * STRAIGHT
+                    100.0 * BENT
                 ),
                 format!(
-                    "slope {} rho U^2 / R_jet; a line misses it by {:.0} % of the largest (root mean square), up to h / R_jet = {:.1}",
+                    "slope {low} rho U^2 / R_jet in the lower half and {high} in the upper one; {} over all, up to h / R_jet = {:.1}, which misses the \
+                     stress by {:.0} % of the largest (root mean square)",
                     fit.slope,
-                    100.0 * fit.misfit / most,
-                    points.last().map_or(0.0, |(height, _)| *height)
+                    over.height(rows.end - 1),
+                    100.0 * fit.misfit / most
                 ),
-                is_straight(fit.misfit / most, noise(&points) / most, STRAIGHT),
+                is_straight(low, high, fit.slope),
             );
         }
     }
@@ -422,7 +414,8 @@ mod tests {
         let fit = over.exponential(1, 0..over.columns());
         approx::assert_relative_eq!(fit.slope.value, -0.9, max_relative = 1e-3);
         assert!(fit.misfit < 1e-3);
-        let (fit, _) = made_up(2.0, |radius| 0.9 * radius).fall(0);
+        let over = made_up(2.0, |radius| 0.9 * radius);
+        let fit = over.fall(0, over.rows(0));
         assert!(fit.misfit < 1e-12 && fit.slope.value < 0.0);
     }
 

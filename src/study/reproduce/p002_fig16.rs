@@ -1,7 +1,7 @@
 //! Paper 002, figure 16: the interference parameter over restitution and friction.
 
-use super::trend::{all, is_below};
 use super::jet::copies_of;
+use super::trend::{all, is_below};
 use super::{Energies, Error, Jet, Report, Settings, Study};
 use crate::estimate::Estimate;
 use crate::grains::{Snapshot, kinetic_energy};
@@ -133,7 +133,8 @@ fn told<'a>(points: impl Iterator<Item = &'a Point>, of: impl Fn(&Point) -> Esti
 fn test_signs(points: &[Point], report: &mut Report) {
     let zero = Estimate::exact(0.0);
     let high = || points.iter().filter(|point| point.jet.restitution == HIGH);
-    report.judge(format!(
+    report.judge(
+        format!(
             "alpha_interf < 0 at high restitution (e = {HIGH}): there is less energy left than without interference"
         ),
         told(high(), Point::alpha),

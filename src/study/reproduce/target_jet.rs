@@ -214,17 +214,21 @@ pub(super) struct Spray {
 }
 
 impl Spray {
-    /// Mean over the copies.
-    pub(super) fn mean(&self, of: impl Fn(&Ejected) -> f64) -> Estimate {
-        Estimate::mean(&self.copies.iter().map(of).collect::<Vec<_>>())
+    /// Mean over the copies. Its error is that of their scatter, or that of the batches within them where it is larger: the scatter of a few copies is
+    /// small by chance now and then.
+    pub(super) fn mean(&self, of: impl Fn(&Ejected) -> Estimate) -> Estimate {
+        let copies: Vec<Estimate> = self.copies.iter().map(of).collect();
+        let mean = Estimate::mean(&copies.iter().map(|copy| copy.value).collect::<Vec<_>>());
+        let within = copies.iter().map(|copy| copy.error.powi(2)).sum::<f64>().sqrt() / copies.len() as f64;
+        Estimate { error: mean.error.max(within), ..mean }
     }
 
     pub(super) fn opening_angle(&self) -> Estimate {
-        self.mean(|ejected| ejected.opening_angle.value)
+        self.mean(|ejected| ejected.opening_angle)
     }
 
     pub(super) fn half_mass_angle(&self) -> Estimate {
-        self.mean(|ejected| ejected.half_mass_angle.value)
+        self.mean(|ejected| ejected.half_mass_angle)
     }
 }
 
