@@ -26,15 +26,16 @@ pub(super) const STUDY: Study = Study {
 /// R* = D_tar / D_jet.
 const TARGETS: [f64; 3] = [4.0, 2.0, 1.0];
 /// Grains across the jet, and copies.
-const SIZE: (f64, u64) = (12.0, 10);
+const SIZE: (f64, u64) = (12.0, 20);
 const QUICK_SIZE: (f64, u64) = (9.0, 8);
 /// The layer in which the stress is looked at over the radius: from 2 to 3 diameters over the target.
 const LAYER: usize = 2;
 /// What differs by less than this part is alike.
 const CLOSE: f64 = 0.2;
-/// The constants of an exponential inside and outside, or the slopes of a line low and high, may differ by this part of that over all and still be
-/// called one; the constants of a Gauss curve differ by all of it. A misfit alone tells little where the stress falls by a factor of two only.
-const BENT: f64 = 0.5;
+/// The constant of an exponential over the inner or the outer half, or the slope of a line over the lower or the upper one, may differ by this part from
+/// that over all and still be called the same; the constants of a Gauss curve differ by twice that. A misfit alone tells little where the stress falls by a
+/// factor of two only.
+const BENT: f64 = 0.25;
 /// Up to where the stress has fallen to this part of the largest its fall with height is looked at.
 const TOP: f64 = 0.1;
 /// Names and titles of the maps.
@@ -167,10 +168,12 @@ fn compute(settings: &Settings<'_>) -> Result<Report, Error> {
     Ok(report)
 }
 
-/// Whether slopes inside and outside are one, as far as [`BENT`] goes.
-fn is_straight(inner: Estimate, outer: Estimate, all: Estimate) -> Option<bool> {
-    let bend = rise(inner, outer);
-    is_above(Estimate { value: bend.value.abs(), ..bend }, BENT * all.value.abs()).map(|above| !above)
+/// Whether the slopes over both halves are that over all, as far as [`BENT`] goes.
+fn is_straight(halves: [Estimate; 2], whole: Estimate) -> Option<bool> {
+    all(halves.map(|half| {
+        let bend = rise(half, whole);
+        is_above(Estimate { value: bend.value.abs(), ..bend }, BENT * whole.value.abs()).map(|above| !above)
+    }))
 }
 
 fn exponential(over: &[Over], report: &mut Report) {
@@ -192,7 +195,7 @@ fn exponential(over: &[Over], report: &mut Report) {
                     fit.slope * -1.0,
                     100.0 * fit.misfit
                 ),
-                is_straight(inner, outer, fit.slope),
+                is_straight([inner, outer], fit.slope * -1.0),
             );
         }
     }
@@ -269,7 +272,7 @@ fn linear(over: &[Over], report: &mut Report) {
                     over.height(rows.end - 1),
                     100.0 * fit.misfit / most
                 ),
-                is_straight(low, high, fit.slope),
+                is_straight([low, high], fit.slope),
             );
         }
     }
