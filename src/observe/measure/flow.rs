@@ -479,6 +479,12 @@ mod tests {
         assert!(energy > 0.0 && energy < ledger.inside().energy() * (1.0 + 1e-12));
         let inside: f64 = (0..JET.len()).map(|cell| flow.cell(cell).density.value * JET.cell_volume()).sum();
         assert!(inside > 0.0 && inside < mass, "some are outside the grid");
+        let all = flow.region(&(0..JET.len()).collect::<Vec<_>>());
+        approx::assert_relative_eq!(
+            all.density.value * JET.cell_volume() * JET.len() as f64,
+            inside,
+            max_relative = 1e-13
+        );
     }
 
     #[test]

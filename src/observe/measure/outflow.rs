@@ -47,9 +47,12 @@ pub struct ProfileMoments<T = f64> {
     pub centroid: T,
     /// Spread about that, in lengths L.
     pub spread: T,
-    /// Third moment over the cube of the spread: positive where the longer tail is that of large heights.
+    /// Third moment over the cube of the spread: positive where the longer tail is that of large heights; 0 where there is no spread.
     pub skewness: T,
 }
+
+/// A variance that is no larger than this part of the mean square is what rounding leaves of none: a spread below a millionth of the height is called 0.
+const SPREAD_ROUNDING: f64 = 1e-12;
 
 /// Sums of ψ (h/L)ⁿ for n = 0 to 3.
 type Powers = [f64; 4];
@@ -81,6 +84,9 @@ impl ProfileMoments {
         let (mean, square, cube) = (first / zeroth, second / zeroth, third / zeroth);
         let variance = square - mean * mean;
         let third = cube - 3.0 * mean * square + 2.0 * mean.powi(3);
+        if variance <= SPREAD_ROUNDING * square {
+            return Self { resultant: zeroth, centroid: mean, spread: 0.0, skewness: 0.0 };
+        }
         Self { resultant: zeroth, centroid: mean, spread: variance.sqrt(), skewness: third / variance.powf(1.5) }
     }
 }
@@ -329,7 +335,9 @@ impl Outflow {
             let ProfileMoments { resultant, centroid, spread, skewness } = self.moments(quantity);
             let mut row = vec![quantity.name().to_owned()];
             let moments = [resultant, centroid, spread, skewness];
-            row.extend(moments.iter().flat_map(|of| [of.value.to_string(), of.error.to_string()]));
+            // Of nothing that leaves there are no moments, and of what leaves in one batch there are no errors.
+            let number = |value: f64| if value.is_finite() { value.to_string() } else { String::new() };
+            row.extend(moments.iter().flat_map(|of| [number(of.value), number(of.error)]));
             table.rows.push(row);
         }
         table
@@ -407,6 +415,7 @@ mod tests {
         // Triangular: skewness -2 √2 / 5.
         check(even(&|x| x, 1.0), [0.5, 2.0 / 3.0, 1.0 / 18.0_f64.sqrt(), -2.0 * 2.0_f64.sqrt() / 5.0]);
         check(even(&|x| 3.0 * (-x).exp(), 60.0), [3.0, 1.0, 1.0, 2.0]);
+        check(ProfileMoments::of([(0.069, 2.0), (0.069, 1.0)]), [3.0, 0.069, 0.0, 0.0]);
     }
 
     #[test]
@@ -428,6 +437,15 @@ mod tests {
         let cells: f64 =
             outflow.profile(Quantity::Mass).iter().map(|(_, rate)| rate.value * 0.5 * FakeJet::UNTIL).sum();
         approx::assert_relative_eq!(cells, through.0, max_relative = 1e-13);
+    }
+
+    #[test]
+    fn what_is_not_known_is_left_empty() {
+        let table = |outflow: &Outflow| outflow.results().tables[1].rows.concat();
+        let mut nothing = outflow(&[Side::XMin], 2);
+        nothing.sample(&Snapshot { time: FakeJet::UNTIL, flights: &[], grains: &[] });
+        assert!(nothing.results().pictures.is_empty());
+        assert!(!table(&nothing).iter().any(|cell| cell.contains("NaN") || cell.contains("inf")));
     }
 
     #[test]

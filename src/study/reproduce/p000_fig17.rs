@@ -235,26 +235,28 @@ fn charts(parameter: &'static str, label: &str, curves: &Curves) -> [Picture; 2]
         1.1 * curves.iter().flat_map(|curve| curve.iter()).map(|(_, at)| at.value + at.error).fold(0.0, f64::max)
     };
     let low = curves.skewness.iter().map(|(_, at)| 1.1 * (at.value - at.error)).fold(0.0, f64::min);
-    let chart = |name, title: &str, range: [f64; 2], lines: Vec<Line>| {
+    let chart = |name, title: &str, label_y: &str, range: [f64; 2], lines: Vec<Line>| {
         Picture::Chart(Chart {
             name,
             title: title.into(),
             shows: "Bars: standard errors by the jackknife over batches".into(),
             x: Axis::linear(label, -0.03 * last, 1.03 * last),
-            y: Axis::linear(title, range[0], range[1]),
+            y: Axis::linear(label_y, range[0], range[1]),
             lines,
         })
     };
     [
         chart(
             names[0],
-            "Resultant over the momentum brought in along the surface",
+            "Resultant of the momentum that leaves downstream",
+            "resultant / momentum brought in along the surface",
             [0.0, top(&[&curves.resultant])],
             vec![Line::measured("resultant", 0, curves.resultant.clone())],
         ),
         chart(
             names[1],
-            "Moments of the outflow of momentum",
+            "Moments of the momentum that leaves downstream",
+            "centroid, spread, skewness",
             [low, top(&[&curves.centroid, &curves.spread, &curves.skewness])],
             vec![
                 Line::measured("centroid / L", 0, curves.centroid.clone()),

@@ -155,7 +155,7 @@ fn compute_10(settings: &Settings<'_>) -> Result<Report, Error> {
         })
     });
     report.measured("Normal stress on the outer parts of the footprint over that on its middle half", listed(&edges));
-    show(&mut report, &jets, "fraction", fractions, "");
+    show(&mut report, &jets, "area fraction", fractions, "");
     Ok(report)
 }
 
