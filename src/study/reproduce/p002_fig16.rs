@@ -144,7 +144,8 @@ fn told<'a>(points: impl Iterator<Item = &'a Point>, of: impl Fn(&Point) -> Esti
 fn test_signs(points: &[Point], report: &mut Report) {
     let zero = Estimate::exact(0.0);
     let high = || points.iter().filter(|point| point.jet.restitution == HIGH);
-    report.judge(format!(
+    report.judge(
+        format!(
             "alpha_interf < 0 at high restitution (e = {HIGH}): there is less energy left than without interference"
         ),
         told(high(), Point::alpha),
