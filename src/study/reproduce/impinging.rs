@@ -26,7 +26,7 @@ const SETTLE: f64 = 30.0;
 /// Breadth of a sine surface, in diameters. The diagonal by which a piece of it is two triangles must run along y to within
 /// [`LARGEST_SLOPE`](crate::surface::LARGEST_SLOPE): once in some million hits, when the contact that was predicted with a face is lost by rounding, the engine takes
 /// the nearest point of the triangle for the contact, and that may be on its diagonal.
-const BREADTH: f64 = 2e4;
+const BREADTH: f64 = 2e5;
 
 /// What the nozzle is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

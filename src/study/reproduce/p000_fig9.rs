@@ -135,15 +135,18 @@ fn compute_10(settings: &Settings<'_>) -> Result<Report, Error> {
         Trend::Falls,
     );
     let half = |jet: &Measured| jet.jet.half_footprint();
-    report.claim_trend(
-        "and it is less peaked: the peak over half a width falls relative to the mean on the footprint",
-        &over(&|jet| {
-            let half = half(jet);
-            jet.derived(|spots| {
-                peak(spots, |spot| spot.normal) / mean(spots, |spot| spot.x.abs() < half, |spot| spot.normal)
-            })
-        }),
-        Trend::Falls,
+    let peaks = over(&|jet| {
+        let half = half(jet);
+        jet.derived(|spots| {
+            peak(spots, |spot| spot.normal) / mean(spots, |spot| spot.x.abs() < half, |spot| spot.normal)
+        })
+    });
+    let (highest, lowest) = (peaks[0].1, peaks[peaks.len() - 1].1);
+    // In between it need not fall all the way, and does not: the numbers tell.
+    report.decide(
+        "Normal stress is peaked at the highest fraction and flatter at the lowest (peak over half a width, relative to the mean on the footprint)",
+        listed(&peaks),
+        difference(highest, lowest),
     );
     let edges = over(&|jet| {
         let half = half(jet);
