@@ -3,7 +3,9 @@
 //! Planar jets (`target_jet`), as the simulations of the paper are planar; restitution 0.8, friction 0.2. The paper compares its targets of 3, 2 and 1 jet
 //! widths with those of 2, 1.62 and 0.88 of the experiment; all are here.
 
-use super::target_jet::{DEVIATIONS, DIAMETER, Fit, Spray, Stream, TargetJet, ideal_angle, is_above, note_set_up, rise, rises, run_sprays};
+use super::target_jet::{
+    DEVIATIONS, DIAMETER, Fit, Spray, Stream, TargetJet, ideal_angle, is_above, note_set_up, rise, rises, run_sprays,
+};
 use super::trend::all;
 use super::{Error, Report, Settings, Study};
 use crate::estimate::{Estimate, Slope};
