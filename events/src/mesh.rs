@@ -26,6 +26,8 @@ pub struct Mesh {
     vertices: Vec<Vector3<f64>>,
     triangles: Vec<[u32; 3]>,
     faces: Vec<Face>,
+    /// Which sides of each triangle lie within a flat piece of the mesh: bits 0 to 2.
+    flat: Vec<u8>,
     /// Where the edges and corners of each triangle begin, and, one past the last triangle, where they end.
     owned: Vec<Owned>,
     edges: Vec<Bordered<Edge>>,
@@ -87,7 +89,8 @@ const NOW: f64 = 1e-9;
 /// Where no contact is predicted any more, the face counts this far (in radii) beyond its border.
 ///
 /// A grazing flight moves on by that much while its normal distance is rounded. Consequence: the normal of a contact with an
-/// edge is taken for that of the face where the two are within 1e-5 of each other.
+/// edge is taken for that of the face where the two are within 1e-5 of each other. A side that lies within a flat piece of the mesh is no border: the
+/// face goes on beyond it.
 const BESIDE: f64 = 1e-5;
 
 /// Direction and length of a vector that is not zero.
@@ -111,6 +114,7 @@ impl Mesh {
         let faces = triangles.iter().enumerate().map(face).collect::<Result<Vec<_>, _>>()?;
         let owned = vec![Owned::default(); triangles.len() + 1];
         let mut mesh = Self {
+            flat: vec![0; triangles.len()],
             vertices,
             triangles,
             faces,
@@ -140,7 +144,9 @@ impl Mesh {
             spokes.push((to, -edge.direction()));
             let outward: Vec<_> =
                 shared.iter().map(|side| self.faces[side.triangle as usize].outward()[side.number as usize]).collect();
-            if !Edge::is_flat(&outward) {
+            if Edge::is_flat(&outward) {
+                shared.iter().for_each(|side| self.flat[side.triangle as usize] |= 1 << side.number);
+            } else {
                 touchable[from as usize] = true;
                 touchable[to as usize] = true;
                 edges.push((shared[0].triangle, self.bordered(edge, outward)));
@@ -286,7 +292,9 @@ impl Mesh {
         });
         let (normal, distance) =
             predicted.filter(|&(_, distance)| distance <= (1.0 + NOW) * sweep.radius).unwrap_or_else(|| {
-                let over_face = self.faces[number].distance_over(centre, BESIDE * sweep.radius).is_some();
+                let is_flat = |side: usize| self.flat[number] >> side & 1 != 0;
+                let border = [0, 1, 2].map(|side| if is_flat(side) { f64::INFINITY } else { BESIDE * sweep.radius });
+                let over_face = self.faces[number].distance_over(centre, border).is_some();
                 let nearest = || unit(centre - self.nearest(number, centre)).unwrap_or_else(on_face);
                 if over_face { on_face() } else { nearest() }
             });
@@ -297,7 +305,7 @@ impl Mesh {
     #[must_use]
     pub fn nearest(&self, number: usize, point: &Vector3<f64>) -> Vector3<f64> {
         let face = &self.faces[number];
-        if let Some(distance) = face.distance_over(point, 0.0) {
+        if let Some(distance) = face.distance_over(point, [0.0; 3]) {
             return point - face.normal() * distance;
         }
         let corners = self.triangle(number);

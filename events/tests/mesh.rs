@@ -188,6 +188,27 @@ fn a_grain_at_rest_on_a_face_an_edge_or_a_corner_is_not_hit_again() {
     }
 }
 
+/// The time of a graze is known so badly that its foot may lie far beyond the side of the triangle that it was predicted with. Where that side is the
+/// diagonal of a flat piece, the closest point of the triangle lies on the diagonal, and a normal from there slants: a planar run stopped at it.
+#[test]
+fn a_graze_along_a_flat_piece_was_given_the_normal_of_its_diagonal() {
+    let slope = |x: f64, y: f64| Vector3::new(x, y, 0.4 * x);
+    let strip = [[0.0, -1.0], [0.1, -1.0], [0.1, 1.0], [0.0, 1.0]].map(|[x, y]| slope(x, y));
+    let mesh = Mesh::new(strip.to_vec(), vec![[0, 1, 2], [0, 2, 3]]).expect("no triangle is degenerate");
+    let normal = Vector3::new(-0.4, 0.0, 1.0).normalize();
+    let along = Vector3::new(1.0, 0.0, 0.4).normalize();
+    for (triangle, x) in [(0, 0.048), (0, 0.02), (1, 0.052), (1, 0.08)] {
+        let centre = slope(x, 0.0) + normal * 0.5;
+        let flight = Flight { position: centre, time: 0.0, velocity: -along, radius: 0.5 };
+        let (found, gap) = mesh.normal_and_gap(triangle, &Sweep::new(&flight, 1.0));
+        assert!((found - normal).norm() < 1e-14 && gap.abs() < 1e-15, "{triangle} at {x}: {found:?}, {gap}");
+    }
+    // Beyond the rim the nearest point counts as before.
+    let beside = Flight { position: slope(0.05, 1.3) + normal * 0.4, time: 0.0, velocity: -along, radius: 0.5 };
+    let (found, gap) = mesh.normal_and_gap(1, &Sweep::new(&beside, 1.0));
+    assert!(found.y > 0.5 && gap.abs() < 1e-15, "{found:?}, {gap}");
+}
+
 #[test]
 fn triangles_without_a_face_are_named() {
     let vertices = vec![Vector3::zeros(), Vector3::x(), Vector3::y(), Vector3::x() * 2.0];

@@ -185,10 +185,12 @@ impl Face {
         point.dot(ab) <= border && point.dot(bc) - self.height <= border && point.dot(ca) <= border
     }
 
-    /// Signed distance of `point` from the plane of the face when its foot lies on the face, or outside by no more than `border`.
-    pub(crate) fn distance_over(&self, point: &Vector3<f64>, border: f64) -> Option<f64> {
+    /// Signed distance of `point` from the plane of the face when its foot lies on the face, or beyond each side by no more than `border`.
+    pub(crate) fn distance_over(&self, point: &Vector3<f64>, border: [f64; 3]) -> Option<f64> {
         let start = point - self.origin;
-        self.covers(&start, border).then(|| start.dot(&self.normal))
+        let [ab, bc, ca] = self.outward.map(|outward| start.dot(&outward));
+        let beyond = [ab, bc - self.height, ca];
+        (0..3).all(|side| beyond[side] <= border[side]).then(|| start.dot(&self.normal))
     }
 
     /// Unit vector from the plane of the face to `point`, exactly along the normal, and their distance.
