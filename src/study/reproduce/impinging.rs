@@ -23,10 +23,8 @@ pub(super) const PER_WIDTH: u32 = 8;
 /// A jet is measured after it has flown its width so many times: later, stresses do not drift.
 const SETTLE: f64 = 30.0;
 
-/// Breadth of a sine surface, in diameters. The diagonal by which a piece of it is two triangles must run along y to within
-/// [`LARGEST_SLOPE`](crate::surface::LARGEST_SLOPE): once in some million hits, when the contact that was predicted with a face is lost by rounding, the engine takes
-/// the nearest point of the triangle for the contact, and that may be on its diagonal.
-const BREADTH: f64 = 2e5;
+/// Breadth of a sine surface, in diameters. It does not change along its breadth.
+const BREADTH: f64 = 20.0;
 
 /// What the nozzle is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

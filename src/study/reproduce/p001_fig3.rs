@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use super::ensemble::run_observed;
-use super::target_jet::{DIAMETER, Fit, TargetJet, copies, is_above, length, note_set_up, rise};
+use super::target_jet::{DIAMETER, Fit, TargetJet, copies, is_above, note_set_up, rise};
 use super::trend::all;
 use super::{Error, Report, Settings, Study};
 use crate::estimate::Estimate;
@@ -381,8 +381,8 @@ fn map(over: &Over, name: &'static str, part: usize) -> Map {
         name,
         title: format!("{} contact stress, D_tar / D_jet = {}", ["Radial", "Axial"][part], over.jet.target),
         shows: "Averaged over both halves, time and copies; Huang, Chan & Zamankhan (2010), fig. 3 to 5".into(),
-        x: length("x / R_jet", -wide, wide),
-        y: length("h / R_jet", 0.0, high),
+        x: Axis::length("x / R_jet", -wide, wide),
+        y: Axis::length("h / R_jet", 0.0, high),
         columns: half.iter().rev().chain(&half).cloned().collect(),
         legend: "stress / rho U^2".into(),
         most: [0.25, 0.6][part],

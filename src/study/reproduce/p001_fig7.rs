@@ -4,7 +4,7 @@
 //! depend on these numbers, as (U² rho / E)^(2/5).
 
 use super::ensemble::run_observed;
-use super::target_jet::{DIAMETER, TargetJet, copies, is_above, length, note_set_up, rise, rises};
+use super::target_jet::{DIAMETER, TargetJet, copies, is_above, note_set_up, rise, rises};
 use super::trend::all;
 use super::{Error, Report, Settings, Study};
 use crate::estimate::Estimate;
@@ -441,8 +441,8 @@ fn map(over: &Over, name: &'static str, field: usize) -> Map {
         name,
         title: format!("{what}, D_tar / D_jet = {}", over.jet.target),
         shows: format!("Soft spheres, averaged over time; the target is at h = 0, |x| < {:.1}", 0.5 * over.jet.target),
-        x: length("x / D_jet", scaled(grid.min[0]), scaled(grid.max[0])),
-        y: length("h / D_jet", scaled(grid.min[2]), scaled(grid.max[2])),
+        x: Axis::length("x / D_jet", scaled(grid.min[0]), scaled(grid.max[0])),
+        y: Axis::length("h / D_jet", scaled(grid.min[2]), scaled(grid.max[2])),
         // The area fraction has a scale of its own.
         most: if field == 1 { 1.0 } else { columns.iter().flatten().flatten().copied().fold(0.0, f64::max) },
         columns,

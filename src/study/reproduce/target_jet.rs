@@ -10,7 +10,6 @@ use super::{Error, Report, Settings};
 use crate::estimate::Estimate;
 use crate::observe::measure::{Ejecta, Ejected, Window};
 use crate::scene::{Scene, Scheme};
-use crate::shown::Axis;
 
 /// Diameter of the grains, m; the paper has 0.25 to 2 mm. Without gravity and at a restitution that does not depend on speed, results depend on
 /// ratios only.
@@ -328,11 +327,6 @@ impl Fit {
     pub(super) fn at(&self, x: f64) -> f64 {
         self.intercept + self.slope.value * x
     }
-}
-
-/// An axis of a map over lengths.
-pub(super) fn length(label: &str, low: f64, high: f64) -> Axis {
-    Axis::linear(label, low, high)
 }
 
 #[cfg(test)]
