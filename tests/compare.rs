@@ -221,5 +221,5 @@ fn every_scene_for_comparisons_is_valid() {
             .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         count += 1;
     }
-    assert_eq!(count, 8);
+    assert_eq!(count, 9);
 }

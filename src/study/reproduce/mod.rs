@@ -2,8 +2,8 @@
 //!
 //! A study is a file here (named after the paper's number and its figure) and a line in [`STUDIES`]. It gets [`Settings`] and gives a [`Report`]; it reads no file and writes none.
 //! What studies share: [`run_all`] (many runs on all cores, in a fixed order), [`Estimate`](crate::estimate::Estimate) (a mean and how sure it is),
-//! [`shown`](crate::shown) (tables and pictures as data), [`Jet`] (the reference jet), `target_jet` (a jet on a target of about its own width), `Impinging` (the jets of Arbelaez et al. 2009), `trend` (whether a series falls, beyond its
-//! errors) and [`Sequence`] (two grains and a wall, in closed form).
+//! [`shown`](crate::shown) (tables and pictures as data), [`Jet`] (the reference jet), `target_jet` (a jet on a target of about its own width), `Impinging` (the
+//! jets of Arbelaez et al. 2009), `trend` (what estimates say about a claim) and [`Sequence`] (two grains and a wall, in closed form).
 
 mod arrivals;
 mod ensemble;
@@ -72,6 +72,21 @@ pub const STUDIES: &[&Study] = &[
     &first_order_or_repeated::STUDY,
 ];
 
+/// Figures that studies named after another one answer for.
+#[rustfmt::skip] // a line for each study
+const ALSO: &[(&str, &[&str])] = &[
+    ("000-fig4", &["000-fig6"]),
+    ("000-fig12", &["000-fig13", "000-fig14", "000-fig15", "000-fig16"]),
+    ("000-fig17", &["000-fig18"]),
+    ("000-fig19", &["000-fig20", "000-fig21"]),
+    ("001-fig1", &["001-fig6"]),
+    ("001-fig3", &["001-fig4", "001-fig5"]),
+    ("001-fig7", &["001-fig8"]),
+    ("002-fig6", &["002-fig7", "002-fig9"]),
+    ("002-fig8", &["002-fig10", "002-fig11", "002-fig12"]),
+    ("002-fig13", &["002-fig14", "002-fig15"]),
+];
+
 /// One statement and the computation that puts it to the test.
 #[derive(Debug)]
 pub struct Study {
@@ -88,9 +103,10 @@ pub struct Study {
 }
 
 impl Study {
-    /// The study of this name.
+    /// The study of this name, or that answers for the figure of this name.
     #[must_use]
     pub fn named(name: &str) -> Option<&'static Self> {
+        let name = ALSO.iter().find(|(_, figures)| figures.contains(&name)).map_or(name, |&(study, _)| study);
         STUDIES.iter().copied().find(|study| study.name == name)
     }
 
@@ -122,8 +138,12 @@ mod tests {
         names.sort_unstable();
         names.dedup();
         assert_eq!(names.len(), STUDIES.len());
-        assert_eq!(Study::nearest("fig4").name, "002-fig4");
+        assert_eq!(Study::nearest("002fig4").name, "002-fig4");
         assert_eq!(Study::nearest("two-grain").name, "two-grains");
         assert!(Study::named("two-grain").is_none());
+        for (study, figures) in ALSO {
+            assert!(figures.iter().all(|figure| !names.contains(figure)), "{study}");
+            assert!(figures.iter().all(|figure| Study::named(figure).is_some_and(|found| found.name == *study)));
+        }
     }
 }
