@@ -28,7 +28,7 @@ pub fn criterion() -> Criterion {
 
 /// Counts grain–grain collisions.
 #[derive(Default)]
-struct Count(u64);
+pub struct Count(pub u64);
 
 impl Observer for Count {
     fn grain_collision(&mut self, _collision: &GrainCollision) {
@@ -54,17 +54,27 @@ pub struct Duel {
     pub collisions: u64,
 }
 
-/// Lets two ways take turns, so that whatever else the machine does troubles both; each gives the number of its collisions.
-pub fn duel(rounds: u32, mut first: impl FnMut() -> u64, mut second: impl FnMut() -> u64) -> Duel {
+/// Lets two ways take turns, so that whatever else the machine does troubles both; each gives the number of its collisions. CPU time.
+pub fn duel(rounds: u32, first: impl FnMut() -> u64, second: impl FnMut() -> u64) -> Duel {
+    duel_by(|| ProcessTime::now().as_duration(), rounds, first, second)
+}
+
+/// The same by another clock.
+pub fn duel_by(
+    clock: impl Fn() -> Duration,
+    rounds: u32,
+    mut first: impl FnMut() -> u64,
+    mut second: impl FnMut() -> u64,
+) -> Duel {
     let mut times = [Vec::new(), Vec::new()];
     let mut collisions = [0; 2];
     for round in 0..rounds {
         // Neither is always the one that finds the caches cold.
         let order = if round % 2 == 0 { [0, 1] } else { [1, 0] };
         for side in order {
-            let start = ProcessTime::now();
+            let start = clock();
             collisions[side] = if side == 0 { first() } else { second() };
-            times[side].push(start.elapsed().as_secs_f64() * 1e6 / collisions[side] as f64);
+            times[side].push((clock() - start).as_secs_f64() * 1e6 / collisions[side] as f64);
         }
     }
     let ratios = times[0].iter().zip(&times[1]).map(|(first, second)| second / first).collect();

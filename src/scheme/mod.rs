@@ -10,7 +10,9 @@ mod substep;
 mod timetable;
 pub mod trapezoidal;
 
-pub use event_driven::{AtRest, EventDriven, Held, LARGEST_OVERLAP, LARGEST_OVERLAP_WITH_FORCES, Laws};
+pub use event_driven::{
+    AtRest, EventDriven, Halves, Held, LARGEST_OVERLAP, LARGEST_OVERLAP_WITH_FORCES, Laws, Windows,
+};
 pub use substep::{Forces, Length, STEPS_PER_CHECK, SubSteps, Substepped};
 pub use timetable::Moments;
 

@@ -44,6 +44,11 @@ impl Default for Plan {
 }
 
 impl Plan {
+    /// Nothing yet, for an owner that the surface stops or does not.
+    pub(crate) fn new(stopped_by_surface: bool) -> Self {
+        Self { stopped_by_surface, ..Self::default() }
+    }
+
     /// The event with another grain ([`Kind::Grains`]) or, where that grain has been deflected meanwhile, a new look ([`Kind::Review`]).
     #[inline]
     pub(crate) fn pair(&self) -> Event {

@@ -8,6 +8,7 @@ use crate::neighbors::{Cells, Near};
 use crate::{Bend, Domain, Flight, NoSurface, Outlook, Surface};
 
 mod ahead;
+mod part;
 mod search;
 mod sub_step;
 
@@ -97,6 +98,12 @@ pub struct Encounters<S: Surface = NoSurface, C: Calendar = Buckets> {
     domain: Domain,
     /// Numbers of grains that have been taken out, free for new ones.
     vacant: Vec<u32>,
+    /// How many grains are inside.
+    count: usize,
+    /// How many grains there are in the whole domain, where only a part of them is here.
+    everywhere: usize,
+    /// Those that the latest encounter has brought to its time, as they were before.
+    before: [Flight; 2],
     /// End of the epoch: nothing beyond it is scheduled.
     horizon: f64,
     /// Whether forces act. Then the flights are chords ([`Bend`]) and the epoch is a sub-step.
@@ -139,6 +146,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     fn without_pairs(flights: Vec<Flight>, surface: S, domain: Domain) -> Self {
         let mut calendar = C::default();
         calendar.reserve(flights.len());
+        let count = flights.len();
         Self {
             flights,
             neighbors: Neighbors::Nobody,
@@ -146,6 +154,9 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             surface,
             domain,
             vacant: Vec::new(),
+            count,
+            everywhere: 0,
+            before: [VACANT; 2],
             horizon: f64::INFINITY,
             under_force: false,
             accelerations: Vec::new(),
@@ -172,7 +183,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     /// How many grains are inside.
     #[must_use]
     pub fn count(&self) -> usize {
-        self.flights.len() - self.vacant.len()
+        self.count
     }
 
     /// What the grains can hit.
@@ -201,15 +212,18 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
                     let (a, b) = (owner.min(event.partner), owner.max(event.partner));
                     self.calendar.plan_mut(a).set_pair(never(Kind::Review));
                     self.calendar.plan_mut(b).set_pair(never(Kind::Review));
+                    self.before = [a, b].map(|grain| self.flights[grain as usize]);
                     self.advance(a, event.time);
                     self.advance(b, event.time);
                     return Some((event.time, Encounter::Grains { a, b }));
                 }
                 Kind::Surface => {
+                    self.before[0] = self.flights[owner as usize];
                     self.advance(owner, event.time);
                     return Some((event.time, Encounter::Surface { grain: owner, element: event.partner }));
                 }
                 Kind::Exit => {
+                    self.before[0] = self.flights[owner as usize];
                     self.advance(owner, event.time);
                     return Some((event.time, Encounter::Exit { grain: owner }));
                 }
@@ -248,6 +262,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             flight.position -= bend.offset(flight.time);
             flight.velocity -= bend.velocity(flight.time);
         }
+        self.count += 1;
         let grain = self.vacant.pop().unwrap_or(self.flights.len() as u32);
         if grain as usize == self.flights.len() {
             self.flights.push(flight);
@@ -263,9 +278,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             }
         }
         match &mut self.neighbors {
-            Neighbors::Cells(cells)
-                if cells.fits(flight.radius) && !cells.crowded(self.flights.len() - self.vacant.len()) =>
-            {
+            Neighbors::Cells(cells) if cells.fits(flight.radius) && !cells.crowded(self.count) => {
                 cells.insert(grain, &self.flights[grain as usize], flight.time);
                 self.predict(grain);
             }
@@ -280,6 +293,12 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
 
     /// Takes a grain out.
     pub fn remove(&mut self, grain: u32) {
+        self.take_out(grain);
+        self.vacant.push(grain);
+    }
+
+    /// Takes a grain out and keeps its number.
+    fn take_out(&mut self, grain: u32) {
         self.release_partner(grain);
         self.calendar.cancel(grain);
         if let Neighbors::Cells(cells) = &mut self.neighbors {
@@ -287,7 +306,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         }
         self.flights[grain as usize] = VACANT;
         *self.calendar.plan_mut(grain) = Plan::default();
-        self.vacant.push(grain);
+        self.count -= 1;
     }
 
     /// Whether a sphere at `position` with this `radius` (m) overlaps no grain at `time`.
@@ -359,7 +378,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     fn lay_out_cells(&mut self, now: f64) {
         let (flights, largest) = self.flights_and_largest_radius();
         assert!(self.domain.holds(largest), "the periodic domain is less than eight grain radii wide");
-        self.fill_cells(Cells::new(self.domain, largest, &flights, now), now);
+        self.fill_cells(Cells::new(self.domain, largest, self.everywhere, &flights, now), now);
     }
 
     fn fill_cells(&mut self, mut cells: Cells, now: f64) {

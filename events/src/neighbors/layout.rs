@@ -48,8 +48,16 @@ pub(super) struct Layout {
 impl Layout {
     /// Cells of about `width` (m), and at least of the size of a contact, for `flights` as they are at `now` (s, epoch time).
     ///
-    /// The grid drifts with the median velocity: that makes the fewest crossings.
-    pub(super) fn new(domain: &Domain, largest_radius: f64, width: Option<f64>, flights: &[Flight], now: f64) -> Self {
+    /// The grid drifts with the median velocity: that makes the fewest crossings. In a period that these fill only in part there are so many
+    /// grains `everywhere`.
+    pub(super) fn new(
+        domain: &Domain,
+        largest_radius: f64,
+        width: Option<f64>,
+        everywhere: usize,
+        flights: &[Flight],
+        now: f64,
+    ) -> Self {
         let contact = contact_width(largest_radius);
         let axes = domain.axes();
         let (mut corner, mut extent) = (Vector3::zeros(), Vector3::repeat(contact));
@@ -68,7 +76,8 @@ impl Layout {
             }
         }
         let volume: f64 = axes.iter().map(|&axis| extent[axis]).product();
-        let one_in_each_slot = (volume / slots(flights.len()) as f64).powf(1.0 / axes.len() as f64);
+        let grains = if domain.periodic { flights.len().max(everywhere) } else { flights.len() };
+        let one_in_each_slot = (volume / slots(grains) as f64).powf(1.0 / axes.len() as f64);
         let reach = |flight: &Flight| (flight.position_at(now) - corner - drift * now).amax();
         let farthest = flights.iter().map(reach).fold(0.0, f64::max);
         let width = contact.max(width.unwrap_or(one_in_each_slot)).max(farthest / FARTHEST_CELL);

@@ -136,6 +136,8 @@ pub(crate) struct Cells {
     domain: Domain,
     /// For so many grains.
     made_for: usize,
+    /// How many grains there are in the whole domain, where only a part of them is here; else 0.
+    everywhere: usize,
     /// The bits of the 27 cells around a cell that can hold grains which touch one in it.
     around: u32,
     slots: Slots,
@@ -146,10 +148,11 @@ pub(crate) struct Cells {
 }
 
 impl Cells {
-    /// An empty grid for grains of radius `largest_radius` at most, laid out for `flights` as they are at `now` (s, epoch time).
-    pub(crate) fn new(domain: Domain, largest_radius: f64, flights: &[Flight], now: f64) -> Self {
-        let layout = Layout::new(&domain, largest_radius, None, flights, now);
-        Self::empty(domain, layout, flights.len())
+    /// An empty grid for grains of radius `largest_radius` at most, laid out for `flights` as they are at `now` (s, epoch time). Where these are only a
+    /// part of the grains in the domain there are so many `everywhere`.
+    pub(crate) fn new(domain: Domain, largest_radius: f64, everywhere: usize, flights: &[Flight], now: f64) -> Self {
+        let layout = Layout::new(&domain, largest_radius, None, everywhere, flights, now);
+        Self::empty(domain, layout, flights.len(), everywhere)
     }
 
     /// The same with cells that are wider than a contact by `skin` (m).
@@ -161,16 +164,17 @@ impl Cells {
         now: f64,
     ) -> Option<Self> {
         let radius = largest_radius + 0.5 * skin;
-        domain.holds(radius).then(|| Self::new(domain, radius, flights, now))
+        domain.holds(radius).then(|| Self::new(domain, radius, 0, flights, now))
     }
 
-    fn empty(domain: Domain, layout: Layout, grains: usize) -> Self {
+    fn empty(domain: Domain, layout: Layout, grains: usize, everywhere: usize) -> Self {
         let offsets = Box::new(std::array::from_fn(|edges| Self::offsets(&layout, edges)));
         // In a planar scene nobody is beside the plane.
         let beside = if domain.planar { AHEAD[1][0] | AHEAD[1][1] } else { 0 };
         let around = ((1 << 27) - 1) & !beside;
         let slots = Slots::new(layout.cells(), grains, NOBODY);
-        Self { layout, domain, made_for: grains, around, slots, links: Vec::new(), places: Vec::new(), offsets }
+        let (links, places) = (Vec::new(), Vec::new());
+        Self { layout, domain, made_for: grains, everywhere, around, slots, links, places, offsets }
     }
 
     /// An empty grid that suits `flights` better, if it is worth its cost; `crossings` and `looks` are what this one took lately.
@@ -189,11 +193,11 @@ impl Cells {
         let (crossing, looking) = (LOOKS_PER_CROSSING * crossings as f64, looks.max(1) as f64);
         let wider = (crossing / (dimensions * looking)).powf(1.0 / (dimensions + 1.0)).clamp(0.5, 2.0);
         let width = self.layout.size.x * wider;
-        let layout = Layout::new(&self.domain, largest_radius, Some(width), flights, now);
+        let layout = Layout::new(&self.domain, largest_radius, Some(width), self.everywhere, flights, now);
         let fewer = layout.crossing_rate(flights, now) / self.layout.crossing_rate(flights, now);
         let more = (layout.size.x / self.layout.size.x).powf(dimensions);
         let worth_it = fewer * crossing + more * looking < WORTH_A_NEW_LAYOUT * (crossing + looking);
-        worth_it.then(|| Self::empty(self.domain, layout, flights.len()))
+        worth_it.then(|| Self::empty(self.domain, layout, flights.len(), self.everywhere))
     }
 
     /// Whether grains of this radius fit the cells.
@@ -263,6 +267,16 @@ impl Cells {
         let (place, number, turned) = self.place(cell);
         self.places[id as usize] = place;
         self.links[id as usize] = Link { number, next: self.slots.replace_first(number, id, NOBODY) | turned };
+    }
+
+    /// Whether grain `id` stands in the cell where it is at `now` (s, epoch time).
+    pub(crate) fn is_in_place(&self, id: u32, flight: &Flight, now: f64) -> bool {
+        self.cell_of(flight.position_at(now), now) == self.places[id as usize].cell
+    }
+
+    /// Whether cells were laid out until `now` (s, epoch time). Before that they are narrower than they may be.
+    pub(crate) fn were_there(&self, now: f64) -> bool {
+        self.layout.born <= now
     }
 
     /// Takes grain `id` out.

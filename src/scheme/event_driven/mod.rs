@@ -7,10 +7,12 @@ use impinge_events::{Domain, Encounter, Encounters, Flight, Surface};
 use nalgebra::Vector3;
 
 mod collapse;
+mod halves;
 mod pressed;
 mod under_force;
 
 use self::collapse::{COLLAPSE_TIME, NO_ROW, Row, SURFACE};
+pub use self::halves::{Halves, Windows};
 pub(super) use self::under_force::Under;
 pub use self::under_force::{AtRest, Held};
 use self::under_force::{UnderForce, energy};
@@ -166,13 +168,19 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
 
     /// Length of an epoch (s) that starts `after` seconds into the current one without forces.
     fn natural_epoch(&mut self, after: f64) -> f64 {
-        self.fastest = self.encounters.surface().speed();
-        self.smallest = f64::INFINITY;
-        for grain in self.encounters.inside() {
-            let flight = self.encounters.flight(grain);
-            self.fastest = self.fastest.max(flight.velocity.amax());
-            self.smallest = self.smallest.min(flight.radius);
-        }
+        (self.fastest, self.smallest) = self.extremes();
+        self.epoch_of_extremes(after)
+    }
+
+    /// Largest speed along any axis, that of the surface included (m/s), and smallest radius (m).
+    fn extremes(&self) -> (f64, f64) {
+        let flights = self.encounters.inside().map(|grain| self.encounters.flight(grain));
+        flights.fold((self.encounters.surface().speed(), f64::INFINITY), |(fastest, smallest), flight| {
+            (fastest.max(flight.velocity.amax()), smallest.min(flight.radius))
+        })
+    }
+
+    fn epoch_of_extremes(&mut self, after: f64) -> f64 {
         let length = epoch_length(self.smallest, self.fastest, self.epoch_start + after);
         self.in_a_row = COLLAPSE_TIME * length;
         length
@@ -226,12 +234,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
                 }
                 continue;
             };
-            self.watch_for_jam(time, encounter)?;
-            match encounter {
-                Encounter::Grains { a, b } => self.collide(time, a, b, observer)?,
-                Encounter::Surface { grain, element } => self.hit(time, grain, element, observer)?,
-                Encounter::Exit { grain } => self.take_out(Passage::Left, time, grain, observer),
-            }
+            self.resolve(time, encounter, observer)?;
             let now = self.epoch_start + time;
             if self.outrun && !self.force.acts {
                 self.start_epoch(time);
@@ -247,6 +250,17 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         }
         self.time = end;
         Ok(watch(self.progress()))
+    }
+
+    #[inline]
+    fn resolve(&mut self, time: f64, encounter: Encounter, observer: &mut impl Observer) -> Result<(), Broken> {
+        self.watch_for_jam(time, encounter)?;
+        match encounter {
+            Encounter::Grains { a, b } => self.collide(time, a, b, observer)?,
+            Encounter::Surface { grain, element } => self.hit(time, grain, element, observer)?,
+            Encounter::Exit { grain } => self.take_out(Passage::Left, time, grain, observer),
+        }
+        Ok(())
     }
 
     /// Stops a run in which time no longer goes on.
@@ -522,23 +536,21 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
 
     /// Shows all grains at simulated time `time` (s), to which the run has been advanced.
     pub fn snapshot<R>(&self, time: f64, look: impl FnOnce(&Snapshot<'_>) -> R) -> R {
-        let mut slots: Vec<u32> = self.encounters.inside().collect();
-        slots.sort_unstable_by_key(|&slot| self.grains[slot as usize].id);
-        let at = |&slot: &u32| {
-            let now = time - self.epoch_start;
-            let mut flight = self.encounters.flight(slot).advanced_to(now);
-            if self.force.acts {
-                let bend = self.encounters.bend(slot);
-                flight.position += bend.offset(now);
-                flight.velocity += bend.velocity(now);
-            }
-            flight.time = 0.0;
-            self.domain.wrap(&mut flight.position);
-            flight
-        };
-        let flights: Vec<Flight> = slots.iter().map(at).collect();
-        let grains: Vec<Grain> = slots.iter().map(|&slot| self.grains[slot as usize]).collect();
-        look(&Snapshot { time, flights: &flights, grains: &grains })
+        snapshot_of(time, self.encounters.inside().map(|slot| (self, slot)).collect(), look)
+    }
+
+    /// A grain at simulated time `time` (s), as a snapshot shows it.
+    fn flight_in_snapshot(&self, slot: u32, time: f64) -> Flight {
+        let now = time - self.epoch_start;
+        let mut flight = self.encounters.flight(slot).advanced_to(now);
+        if self.force.acts {
+            let bend = self.encounters.bend(slot);
+            flight.position += bend.offset(now);
+            flight.velocity += bend.velocity(now);
+        }
+        flight.time = 0.0;
+        self.domain.wrap(&mut flight.position);
+        flight
     }
 
     #[inline]
@@ -558,6 +570,18 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         }
         Err(broken(self.epoch_start + time, ids, overlap, allowed, numbers))
     }
+}
+
+/// Shows the grains in these slots of engines at simulated time `time` (s), in the order of their ids.
+fn snapshot_of<S: Surface, C: Calendar, R>(
+    time: f64,
+    mut slots: Vec<(&EventDriven<S, C>, u32)>,
+    look: impl FnOnce(&Snapshot<'_>) -> R,
+) -> R {
+    slots.sort_unstable_by_key(|&(engine, slot)| engine.grains[slot as usize].id);
+    let flights: Vec<Flight> = slots.iter().map(|&(engine, slot)| engine.flight_in_snapshot(slot, time)).collect();
+    let grains: Vec<Grain> = slots.iter().map(|&(engine, slot)| engine.grains[slot as usize]).collect();
+    look(&Snapshot { time, flights: &flights, grains: &grains })
 }
 
 /// Length of an epoch that starts at simulated time `start` (s), for grains of this radius (m) and speed (m/s): a power of two.

@@ -1,0 +1,430 @@
+//! Two cores share one domain, and find what one alone would find, bit for bit.
+//!
+//! The domain is cut in two. Each half of the grains has an engine of its own, which also follows copies of the other half's grains near the cut. For
+//! a short window both run on their own. The outer edge of the copies goes wrong meanwhile, because what lies beyond is not there; so what both saw
+//! is compared ([`Sharing::disagreement`]), and where a grain may have felt a copy that went wrong the window ends early: what came later is
+//! undone. Then copies are renewed. States are pure and the order of events is total, so it is the same whoever resolves an event.
+//!
+//! What is rare (an epoch that ends early, a broken invariant) is left to one engine alone, in which both halves are put together again.
+
+mod cut;
+mod sharing;
+mod window;
+
+use std::ops::ControlFlow;
+
+use impinge_events::calendar::{Buckets, Calendar};
+use impinge_events::{Flight, Surface};
+
+use self::sharing::{NOT_SHARED, SHARED, Sharing};
+use self::window::{Happened, Log};
+use super::collapse::Row;
+use super::{EventDriven, snapshot_of};
+use crate::grains::{Grain, Snapshot};
+use crate::scheme::{Broken, Observer, Progress};
+
+/// Copies are given up when they are so many times as far from the cut as those that are taken in.
+const LINGERING: f64 = 1.2;
+/// Who may soon have a copy is so many times as far from the cut as those that have one. Until somebody may have flown the difference nobody else is
+/// looked at.
+const NEAR: f64 = 2.0;
+/// First window: the time in which the fastest grain flies this part of the zone in which there are copies.
+const FIRST_WINDOW: f64 = 0.2;
+/// A window that went well is followed by one so many times as long, ...
+const LONGER: f64 = 1.03;
+/// ... or, as long as none has ended early, so many times.
+const MUCH_LONGER: f64 = 1.5;
+/// One that ended early is followed by one of this part of the time that it lasted, ...
+const SHORTER: f64 = 0.9;
+/// ... and at least this part of itself.
+const SHORTEST: f64 = 0.25;
+/// Where one half has more to do by this part, the cut moves towards it ...
+const UNEVEN: f64 = 0.02;
+/// ... by this part of the zone.
+const SHIFT: f64 = 0.05;
+
+/// Grains in free flight between events, as [`EventDriven`], in two halves that run at once. No grain may enter.
+#[derive(Clone, Debug)]
+pub struct Halves<S: Surface, C: Calendar = Buckets> {
+    halves: [Half<S, C>; 2],
+    sharing: Sharing,
+    /// Length of the next window, s.
+    window: f64,
+    /// Time that has been reached, s (epoch time).
+    now: f64,
+    /// The same as simulated time, s.
+    time: f64,
+    collisions: u64,
+    inside: usize,
+    windows: Windows,
+    /// What there was since grains near the cut were found.
+    since_near: Since,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Since {
+    events: usize,
+    windows: usize,
+}
+
+#[derive(Clone, Debug)]
+struct Half<S: Surface, C: Calendar> {
+    engine: EventDriven<S, C>,
+    log: Log,
+}
+
+/// How the windows of a run went.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Windows {
+    /// How many there were.
+    pub count: u64,
+    /// How many of them ended early, because a copy had gone wrong that a grain may have felt.
+    pub cut_short: u64,
+    /// How many were left to one engine.
+    pub alone: u64,
+}
+
+/// What becomes of the copy of a grain.
+struct Renewal {
+    grain: u32,
+    /// The state that it gets; none where it is given up.
+    state: Option<(Flight, Grain, Option<Row>)>,
+}
+
+impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves<S, C> {
+    /// Two halves of a run on which no force acts.
+    #[must_use]
+    pub fn of(engine: EventDriven<S, C>) -> Self {
+        let (time, collisions, inside) = (engine.time, engine.collisions, engine.encounters.count());
+        let now = engine.time - engine.epoch_start;
+        let sharing = Sharing::of(&engine, now);
+        let window = FIRST_WINDOW * sharing.zone / engine.fastest;
+        let halves = [engine.clone(), engine].map(|engine| Half { engine, log: Log::default() });
+        let mut run = Self {
+            halves,
+            sharing,
+            window,
+            now,
+            time,
+            collisions,
+            inside,
+            windows: Windows::default(),
+            since_near: Since::default(),
+        };
+        run.divide();
+        run
+    }
+
+    /// Simulated time that has been reached, s.
+    #[must_use]
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// Simulated time at the start of the epoch, s: times of the surface count from it.
+    #[must_use]
+    pub fn epoch_start(&self) -> f64 {
+        self.halves[0].engine.epoch_start
+    }
+
+    /// How the windows went.
+    #[must_use]
+    pub fn windows(&self) -> Windows {
+        self.windows
+    }
+
+    /// What the grains can hit.
+    #[must_use]
+    pub fn surface(&self) -> &S {
+        self.halves[0].engine.surface()
+    }
+
+    /// Resolves all events up to simulated time `end` (s). When and how often it is called changes nothing of what happens.
+    ///
+    /// # Errors
+    /// A broken invariant: grains that overlap, or a state that is no number.
+    pub fn advance(
+        &mut self,
+        end: f64,
+        observer: &mut impl Observer,
+        watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<ControlFlow<()>, Broken> {
+        loop {
+            let EventDriven { epoch_start, epoch, .. } = self.halves[0].engine;
+            let epoch_end = epoch_start + epoch;
+            let limit = if end < epoch_end { end - epoch_start } else { epoch };
+            self.run_window(limit, observer)?;
+            if self.epoch_start() == epoch_start && self.now >= limit {
+                if end <= epoch_end {
+                    break;
+                }
+                self.start_epoch();
+            }
+            self.time = self.epoch_start() + self.now;
+            if watch(self.progress()).is_break() {
+                return Ok(ControlFlow::Break(()));
+            }
+        }
+        self.time = end;
+        Ok(watch(self.progress()))
+    }
+
+    fn progress(&self) -> Progress {
+        Progress { time: self.time, collisions: self.collisions, inside: self.inside }
+    }
+
+    /// Goes on for a window, not beyond `limit` (s, epoch time).
+    fn run_window(&mut self, limit: f64, observer: &mut impl Observer) -> Result<(), Broken> {
+        let from = self.now;
+        let until = limit.min(from + self.window.min(self.sharing.safe_for(self.sharing.fastest)));
+        self.windows.count += 1;
+        self.sharing.begin();
+        let sharing = &self.sharing;
+        let run = |Half { engine, log }: &mut Half<S, C>| engine.run_window(until, sharing, log);
+        let [first, second] = &mut self.halves;
+        let (ours, theirs) = rayon::join(|| run(first), || run(second));
+        if ours.is_err() || theirs.is_err() || self.halves.iter().any(|half| half.log.outrun) {
+            return self.run_alone(until, observer);
+        }
+        self.now = until;
+        for half in &self.halves {
+            self.sharing.fastest = self.sharing.fastest.max(half.log.fastest);
+        }
+        self.turn_back(from + self.sharing.safe_for(self.sharing.fastest));
+        let [first, second] = &self.halves;
+        if let Some((counts, time)) = self.sharing.disagreement([&first.log, &second.log]) {
+            self.undo(counts, time);
+        }
+        let halves = &self.halves;
+        let strayed = self.sharing.first_stray(|half, grain| halves[half].engine.encounters.flight(grain), self.now);
+        self.turn_back(strayed);
+        let events = self.halves.iter().map(|half| half.log.events.len()).sum::<usize>();
+        if self.now == from && events == 0 && until > from {
+            return self.run_alone(until, observer);
+        }
+        self.since_near.events += events;
+        self.since_near.windows += 1;
+        self.sharing.flown += (self.now - from) * self.sharing.fastest;
+        self.tell(observer);
+        self.balance();
+        self.renew_copies();
+        if self.now < until {
+            self.windows.cut_short += 1;
+            self.window *= (SHORTER * (self.now - from) / self.window).max(SHORTEST);
+        } else if until < limit {
+            self.window *= if self.windows.cut_short == 0 { MUCH_LONGER } else { LONGER };
+        }
+        Ok(())
+    }
+
+    /// Undoes what happened at `time` (s, epoch time) or later.
+    fn turn_back(&mut self, time: f64) {
+        if time < self.now {
+            let counts = self.halves.each_ref().map(|half| half.log.count_before(|event| event.time >= time));
+            self.undo(counts, time);
+        }
+    }
+
+    /// Undoes all events but so many of each half, and goes back to `now` (s, epoch time), between the two.
+    fn undo(&mut self, counts: [usize; 2], now: f64) {
+        let [first, second] = &mut self.halves;
+        let back = |Half { engine, log }: &mut Half<S, C>, count| engine.undo(log, count, now);
+        rayon::join(|| back(first, counts[0]), || back(second, counts[1]));
+        self.now = now;
+    }
+
+    /// Tells an observer what happened, each event once, in their order.
+    fn tell(&mut self, observer: &mut impl Observer) {
+        let logs = self.halves.each_ref().map(|half| &half.log);
+        let mut next = [0, 0];
+        loop {
+            let heads: [_; 2] = std::array::from_fn(|half| logs[half].events.get(next[half]));
+            let places = heads.map(|head| head.map(Happened::place));
+            let Some(first) = places.iter().flatten().min() else { break };
+            for half in 0..2 {
+                let Some(event) = heads[half].filter(|_| places[half] == Some(*first)) else { continue };
+                let mut belong = event.grains().map(|grain| self.sharing.belongs_to(half, grain));
+                // What happened across the cut the first half tells.
+                if if half == 0 { belong.any(|ours| ours) } else { belong.all(|ours| ours) } {
+                    let (collisions, gone) = logs[half].tell(next[half], observer);
+                    self.collisions += collisions;
+                    self.inside -= gone;
+                }
+                next[half] += 1;
+            }
+        }
+    }
+
+    /// Moves the cut towards the half that has more to do.
+    fn balance(&mut self) {
+        let [first, second] = self.halves.each_ref().map(|half| half.log.events.len() as f64);
+        if (first - second).abs() > UNEVEN * (first + second) {
+            let way = SHIFT * self.sharing.zone;
+            self.sharing.cut.shift(way * (second - first).signum());
+            self.sharing.flown += way;
+        }
+    }
+
+    /// Finds all grains that are so near the cut that they may soon have a copy, or have one.
+    fn find_near(&mut self) {
+        let Since { events, windows } = std::mem::take(&mut self.since_near);
+        if windows > 0 {
+            self.sharing.adapt_zone(events / windows);
+        }
+        let of = |half: usize| {
+            let (engine, sharing) = (&self.halves[half].engine, &self.sharing);
+            let (mut near, mut fastest) = (Vec::new(), 0.0_f64);
+            for grain in (0..sharing.owner.len() as u32).filter(|&grain| sharing.belongs_to(half, grain)) {
+                let (flight, copy) = (engine.encounters.flight(grain), sharing.wrong_since[grain as usize]);
+                fastest = fastest.max(sharing.speed(flight));
+                let is_near = || sharing.cut.depth(half, flight, self.now) < NEAR * sharing.zone;
+                if copy != NOT_SHARED || (engine.encounters.is_inside(grain) && is_near()) {
+                    near.push(grain);
+                }
+            }
+            (near, fastest)
+        };
+        let ((mut near, ours), (others, theirs)) = rayon::join(|| of(0), || of(1));
+        near.extend(others);
+        (self.sharing.near, self.sharing.flown, self.sharing.fastest) = (near, 0.0, ours.max(theirs));
+    }
+
+    /// Hands grains over that have crossed the cut, and gives both halves copies of what is near it.
+    fn renew_copies(&mut self) {
+        if self.sharing.flown > (NEAR - 1.0) * self.sharing.zone {
+            self.find_near();
+        }
+        let of = |half: usize| self.renewals(half);
+        let ((mut crossed, for_second), (others, for_first)) = rayon::join(|| of(0), || of(1));
+        crossed.extend(others);
+        for grain in crossed {
+            self.sharing.owner[grain as usize] ^= 1;
+        }
+        for renewal in for_first.iter().chain(&for_second) {
+            self.sharing.wrong_since[renewal.grain as usize] =
+                if renewal.state.is_some() { SHARED } else { NOT_SHARED };
+        }
+        let [first, second] = &mut self.halves;
+        let now = self.now;
+        rayon::join(|| first.engine.renew(&for_first, now), || second.engine.renew(&for_second, now));
+    }
+
+    /// Which grains of a half have gone over to the other one, and which copies there have to change.
+    fn renewals(&self, half: usize) -> (Vec<u32>, Vec<Renewal>) {
+        let (engine, sharing) = (&self.halves[half].engine, &self.sharing);
+        let (mut crossed, mut renewals) = (Vec::new(), Vec::new());
+        for grain in sharing.near.iter().copied().filter(|&grain| sharing.belongs_to(half, grain)) {
+            let copy = sharing.wrong_since[grain as usize];
+            if !engine.encounters.is_inside(grain) {
+                if copy != NOT_SHARED {
+                    renewals.push(Renewal { grain, state: None });
+                }
+                continue;
+            }
+            let flight = engine.encounters.flight(grain);
+            let depth = sharing.cut.depth(half, flight, self.now);
+            if copy == SHARED {
+                if depth < 0.0 {
+                    crossed.push(grain);
+                } else if depth > LINGERING * sharing.zone {
+                    renewals.push(Renewal { grain, state: None });
+                }
+            } else if depth < sharing.zone {
+                let (carried, row) = (engine.grains[grain as usize], engine.rows.get(grain as usize));
+                renewals.push(Renewal { grain, state: Some((*flight, carried, row.copied())) });
+            } else if copy != NOT_SHARED {
+                renewals.push(Renewal { grain, state: None });
+            }
+        }
+        (crossed, renewals)
+    }
+
+    /// Starts a new epoch for both halves, of the length that one engine would choose.
+    fn start_epoch(&mut self) {
+        let (after, extremes) = (self.now, self.halves.each_ref().map(|half| half.engine.extremes()));
+        let (fastest, smallest) = (extremes[0].0.max(extremes[1].0), extremes[0].1.min(extremes[1].1));
+        let start = |Half { engine, .. }: &mut Half<S, C>| {
+            (engine.fastest, engine.smallest) = (fastest, smallest);
+            let length = engine.epoch_of_extremes(after);
+            engine.encounters.start_epoch(after, length);
+            engine.begin(after, length);
+        };
+        let [first, second] = &mut self.halves;
+        rayon::join(|| start(first), || start(second));
+        self.now = 0.0;
+    }
+
+    /// Starts the window again and goes on until `until` (s, epoch time) with one engine that has all grains.
+    #[cold]
+    fn run_alone(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Broken> {
+        self.windows.alone += 1;
+        self.undo([0, 0], self.now);
+        self.renew_copies();
+        let [whole, other] = &mut self.halves;
+        let theirs = (0..).zip(&self.sharing.owner).filter(|&(_, &owner)| owner == 1).map(|(grain, _)| grain);
+        let theirs: Vec<u32> = theirs.filter(|&grain| other.engine.encounters.is_inside(grain)).collect();
+        for &grain in &theirs {
+            whole.engine.grains[grain as usize] = other.engine.grains[grain as usize];
+            if let Some(row) = whole.engine.rows.get_mut(grain as usize) {
+                *row = other.engine.rows[grain as usize];
+            }
+        }
+        let states = theirs.iter().map(|&grain| {
+            let stopped = other.engine.is_stopped_by_surface(grain);
+            (grain, *other.engine.encounters.flight(grain), stopped)
+        });
+        whole.engine.encounters.gather(states, self.now);
+        let before = whole.engine.collisions;
+        let end = whole.engine.epoch_start + until;
+        whole.engine.advance(end, observer, &mut |_| ControlFlow::Continue(()))?.is_continue();
+        self.collisions += whole.engine.collisions - before;
+        self.inside = whole.engine.encounters.count();
+        self.now = end - whole.engine.epoch_start;
+        other.engine = whole.engine.clone();
+        self.sharing = Sharing::of(&whole.engine, self.now);
+        self.divide();
+        Ok(())
+    }
+
+    /// Leaves each engine its grains, when both have all of them.
+    fn divide(&mut self) {
+        let (sharing, everywhere, now) = (&self.sharing, self.inside, self.now);
+        let keep = |half: usize, engine: &mut EventDriven<S, C>| {
+            let known = |grain| sharing.belongs_to(half, grain) || sharing.is_shared(grain);
+            engine.encounters.keep_only(known, everywhere, now);
+        };
+        let [first, second] = &mut self.halves;
+        rayon::join(|| keep(0, &mut first.engine), || keep(1, &mut second.engine));
+        self.find_near();
+    }
+
+    /// The grains inside, each in the half to which it belongs.
+    fn own(&self) -> impl Iterator<Item = (&EventDriven<S, C>, u32)> {
+        (0..).zip(&self.sharing.owner).filter_map(|(grain, &owner)| {
+            let engine = &self.halves[usize::from(owner)].engine;
+            engine.encounters.is_inside(grain).then_some((engine, grain))
+        })
+    }
+
+    /// Shows all grains at simulated time `time` (s), to which the run has been advanced.
+    pub fn snapshot<R>(&self, time: f64, look: impl FnOnce(&Snapshot<'_>) -> R) -> R {
+        snapshot_of(time, self.own().collect(), look)
+    }
+}
+
+impl<S: Surface, C: Calendar> EventDriven<S, C> {
+    /// Gives copies their new states, or gives them up, at `now` (s, epoch time).
+    fn renew(&mut self, renewals: &[Renewal], now: f64) {
+        for renewal in renewals {
+            self.lift(renewal.grain);
+        }
+        for Renewal { grain, state } in renewals {
+            let Some((flight, carried, row)) = state else { continue };
+            self.grains[*grain as usize] = *carried;
+            if let Some(row) = row {
+                self.rows[*grain as usize] = *row;
+            }
+            self.put_down(*grain, *flight, now);
+        }
+    }
+}

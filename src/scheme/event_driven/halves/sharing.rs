@@ -1,0 +1,200 @@
+//! Who knows which grains, and whether both halves saw the same.
+
+use impinge_events::calendar::Calendar;
+use impinge_events::{Flight, Surface};
+
+use super::EventDriven;
+use super::cut::Cut;
+use super::window::{Happened, Log};
+
+/// This part of all grains have copies in the other half at first, and at the most: that much more work, and that much longer windows.
+const COPIES: [f64; 2] = [0.1, 0.3];
+/// So many events in a window are neither too few, so that to put the halves together again costs too much, nor more than it takes.
+const EVENTS: [usize; 2] = [1500, 4000];
+/// By how much the zone is made thinner at once.
+const THINNER: f64 = 0.9;
+/// The zone in which there are copies is so many times as thick as the largest radius, at least.
+const LEAST_ZONE: f64 = 4.0;
+/// By this part grains keep farther from the cut than they must, so that it is no matter of rounding.
+const MARGIN: f64 = 1e-3;
+
+/// The other half has no copy of a grain.
+pub(super) const NOT_SHARED: f64 = f64::NEG_INFINITY;
+/// The other half has a good copy of a grain.
+pub(super) const SHARED: f64 = f64::INFINITY;
+
+/// Each grain belongs to one half; those near the cut have a copy in the other half.
+#[derive(Clone, Debug)]
+pub(super) struct Sharing {
+    pub(super) cut: Cut,
+    /// How far from the cut grains have a copy, m.
+    pub(super) zone: f64,
+    most_zone: f64,
+    /// The largest radius and a little, m.
+    pub(super) margin: f64,
+    /// Largest speed towards the cut that any grain has, or had lately, m/s.
+    pub(super) fastest: f64,
+    /// All grains that are, or soon may be, so near the cut that they have a copy.
+    pub(super) near: Vec<u32>,
+    /// How far towards the cut a grain may have flown since these were found, m.
+    pub(super) flown: f64,
+    /// The copies that have gone wrong in this window.
+    pub(super) wrong: Vec<u32>,
+    /// When a grain whose copy is wrong first came to the cut, s (epoch time).
+    strayed: f64,
+    /// To which half each grain belongs.
+    pub(super) owner: Vec<u8>,
+    /// When the copy of each grain went wrong, s (epoch time); [`NOT_SHARED`] or [`SHARED`] where there is none or it is good.
+    pub(super) wrong_since: Vec<f64>,
+}
+
+impl Sharing {
+    /// Gives each grain of an engine to one half, as of `now` (s, epoch time).
+    pub(super) fn of<S: Surface, C: Calendar>(engine: &EventDriven<S, C>, now: f64) -> Self {
+        let grains: Vec<(u32, Flight)> =
+            engine.encounters.inside().map(|grain| (grain, *engine.encounters.flight(grain))).collect();
+        let flights: Vec<Flight> = grains.iter().map(|&(_, flight)| flight).collect();
+        let cut = Cut::through(&flights, &engine.domain, now);
+        let depths = flights.iter().map(|flight| cut.depth(0, flight, now));
+        let mut sorted: Vec<f64> = depths.clone().map(f64::abs).collect();
+        let margin = (1.0 + MARGIN) * engine.largest_radius();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let [zone, most_zone] = COPIES.map(|part| {
+            let copies = sorted.get((part * sorted.len() as f64) as usize).copied().unwrap_or_default();
+            copies.max(LEAST_ZONE * margin)
+        });
+        let slots = engine.grains.len();
+        let (mut owner, mut wrong_since) = (vec![0; slots], vec![NOT_SHARED; slots]);
+        for (&(grain, _), depth) in grains.iter().zip(depths) {
+            owner[grain as usize] = u8::from(depth < 0.0);
+            if depth.abs() < zone {
+                wrong_since[grain as usize] = SHARED;
+            }
+        }
+        let (near, wrong) = (Vec::new(), Vec::new());
+        let (fastest, flown, strayed) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
+        Self { cut, zone, most_zone, margin, fastest, near, flown, wrong, strayed, owner, wrong_since }
+    }
+
+    /// How long no grain that only one half knows can come to the cut, s, where none is faster than `fastest` (m/s). On its own side it meets no grain
+    /// that only the other half knows.
+    pub(super) fn safe_for(&self, fastest: f64) -> f64 {
+        (self.zone - self.margin) / fastest
+    }
+
+    /// Makes the zone thicker where there are few events in a window, so that they become longer, and thinner where there are many.
+    pub(super) fn adapt_zone(&mut self, events: usize) {
+        let factor = if events < EVENTS[0] {
+            1.0 / THINNER
+        } else if events > EVENTS[1] {
+            THINNER
+        } else {
+            1.0
+        };
+        self.zone = (self.zone * factor).clamp(self.least_zone(), self.most_zone);
+    }
+
+    fn least_zone(&self) -> f64 {
+        LEAST_ZONE * self.margin
+    }
+
+    /// Begins a window.
+    pub(super) fn begin(&mut self) {
+        self.wrong.clear();
+        self.strayed = f64::INFINITY;
+    }
+
+    /// Whether both halves know a grain.
+    #[inline]
+    pub(super) fn is_shared(&self, grain: u32) -> bool {
+        self.wrong_since[grain as usize] == SHARED
+    }
+
+    #[inline]
+    pub(super) fn belongs_to(&self, half: usize, grain: u32) -> bool {
+        usize::from(self.owner[grain as usize]) == half
+    }
+
+    /// Speed of a flight towards the cut or away from it, m/s.
+    #[inline]
+    pub(super) fn speed(&self, flight: &Flight) -> f64 {
+        flight.velocity[self.cut.axis].abs()
+    }
+
+    /// Notes where a grain whose copy is wrong has flown until `until` (s, epoch time).
+    fn follow(&mut self, grain: u32, flight: &Flight, until: f64) {
+        let (owner, since) = (usize::from(self.owner[grain as usize]), self.wrong_since[grain as usize]);
+        let between = [flight.time.max(since), until];
+        self.strayed =
+            self.cut.stray(owner, flight, between, self.margin).map_or(self.strayed, |at| at.min(self.strayed));
+    }
+
+    /// When a grain whose copy is wrong first came to the cut until `now` (s, epoch time), as `flight` tells what it does since its latest event; infinity
+    /// where none did.
+    pub(super) fn first_stray<'a>(&mut self, flight: impl Fn(usize, u32) -> &'a Flight, now: f64) -> f64 {
+        for grain in std::mem::take(&mut self.wrong) {
+            let flight = flight(usize::from(self.owner[grain as usize]), grain);
+            if flight.radius > 0.0 {
+                self.follow(grain, flight, now);
+            }
+        }
+        self.strayed
+    }
+
+    /// Looks through what the two halves saw, in the order of events, as long as grains that belong to a half have not felt a copy that went
+    /// wrong. Where that can no longer be said it gives how many events of each half come before, and the time (s, epoch time). Copies that went wrong
+    /// are noted.
+    ///
+    /// All states of grains in the half to which they belong are true until then. For let an event be the first that is wrong or missing there. If both
+    /// grains belong to that half it is right. If one is a copy, either the copy was wrong, and its history differs from the true one, which
+    /// the other half saw, or the other half saw the event and this one did not; both are found here. If neither half has a good copy of the other's
+    /// grain then each of the two has stayed on its side of the cut, and they did not meet.
+    pub(super) fn disagreement(&mut self, logs: [&Log; 2]) -> Option<([usize; 2], f64)> {
+        let mut next = [0, 0];
+        loop {
+            let events: [Option<usize>; 2] = std::array::from_fn(|half| {
+                logs[half]
+                    .shared
+                    .get(next[half])
+                    .map(|&event| event as usize)
+                    .filter(|&event| event < logs[half].events.len())
+            });
+            let heads: [Option<&Happened>; 2] =
+                std::array::from_fn(|half| events[half].map(|event| &logs[half].events[event]));
+            let places = heads.map(|head| head.map(Happened::place));
+            let first = places.iter().flatten().min().copied()?;
+            let seen = places.map(|place| place == Some(first));
+            for half in 0..2 {
+                let Some(event) = heads[half].filter(|_| seen[half]) else { continue };
+                next[half] += 1;
+                if !self.is_agreed(half, event, seen[1 - half]) {
+                    let counts = [0, 1].map(|half| logs[half].count_before(|event| event.place() >= first));
+                    return Some((counts, event.time));
+                }
+            }
+        }
+    }
+
+    /// Whether an event that `half` saw, and the other half too or not, leaves the grains of both halves as they truly are.
+    fn is_agreed(&mut self, half: usize, event: &Happened, by_both: bool) -> bool {
+        let ours = |sharing: &Self, grain: u32| sharing.belongs_to(half, grain);
+        let is_true = event.grains().all(|grain| ours(self, grain) || self.is_shared(grain));
+        for (grain, flight) in event.flights() {
+            let ours = ours(self, grain);
+            // The other half did not see what happened to its grain, or ours felt what was not so.
+            if if is_true { !by_both && !ours } else { ours } {
+                return false;
+            }
+            if self.is_shared(grain) {
+                if !is_true || !by_both {
+                    self.wrong_since[grain as usize] = event.time;
+                    self.wrong.push(grain);
+                    self.follow(grain, &flight, event.time);
+                }
+            } else if ours && self.wrong_since[grain as usize] != NOT_SHARED {
+                self.follow(grain, &flight, event.time);
+            }
+        }
+        true
+    }
+}
