@@ -84,13 +84,12 @@ fn race(start: &EventDriven<Surface>, part: f64, rounds: u32) -> Duel {
     );
     let states = |snapshot: &impinge::grains::Snapshot<'_>| snapshot.flights.to_vec();
     assert!(one.snapshot(one.time(), states) == two.snapshot(two.time(), states), "not the same bits");
-    eprintln!("{:?}", two.windows());
     duel
 }
 
 fn main() {
     let largest = std::env::args().find_map(|argument| argument.parse::<f64>().ok()).unwrap_or(1e5);
-    let within = |grains: f64| !(grains > 1.01 * if trial() { 1e4 } else { largest });
+    let within = |grains: f64| grains <= 1.01 * if trial() { 1e4 } else { largest };
     let rounds = if trial() { 1 } else { ROUNDS };
     eprintln!(
         "{:42} {:>10} {:>10} {:>10} {:>8}",

@@ -172,8 +172,8 @@ fn an_epoch_that_ends_early() {
         grains.push(NewGrain { position, velocity, spin: Vector3::zeros(), radius, density: 1.0, strength: 1.0 });
         place += 1.1 * radius;
     }
-    let (windows, log) = Case { grains, surface: nothing(), domain, laws: smooth(1.0, 1.0) }.compare(2.0, 2);
-    assert!(windows.alone > 0 && log.0.len() > 200, "{} collisions, {windows:?}", log.0.len());
+    let (windows, log) = Case { grains, surface: nothing(), domain, laws: smooth(1.0, 1.0) }.compare(12.0, 2);
+    assert!(windows.alone > 0 && log.0.len() > 150, "{} collisions, {windows:?}", log.0.len());
 }
 
 fn jet(count: u32, domain: Domain, laws: Laws) -> Case {

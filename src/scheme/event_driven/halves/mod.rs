@@ -268,8 +268,8 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
     /// Finds all grains that are so near the cut that they may soon have a copy, or have one.
     fn find_near(&mut self) {
         let Since { events, windows } = std::mem::take(&mut self.since_near);
-        if windows > 0 {
-            self.sharing.adapt_zone(events / windows);
+        if let Some(events) = events.checked_div(windows) {
+            self.sharing.adapt_zone(events);
         }
         let of = |half: usize| {
             let (engine, sharing) = (&self.halves[half].engine, &self.sharing);
