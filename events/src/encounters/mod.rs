@@ -102,6 +102,8 @@ pub struct Encounters<S: Surface = NoSurface, C: Calendar = Buckets> {
     count: usize,
     /// How many grains there are in the whole domain, where only a part of them is here.
     everywhere: usize,
+    /// Who has crossed into another cell lately, where only a part of the grains is here.
+    crossed: Vec<u32>,
     /// Those that the latest encounter has brought to its time, as they were before.
     before: [Flight; 2],
     /// End of the epoch: nothing beyond it is scheduled.
@@ -156,6 +158,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             vacant: Vec::new(),
             count,
             everywhere: 0,
+            crossed: Vec::new(),
             before: [VACANT; 2],
             horizon: f64::INFINITY,
             under_force: false,
@@ -550,6 +553,9 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     /// Moves a grain into the next cell, at `now`, and looks at the neighbours that it has there.
     fn cross(&mut self, grain: u32, now: f64) {
         self.crossings += 1;
+        if self.everywhere > 0 {
+            self.crossed.push(grain);
+        }
         if self.crossings > CROSSINGS_PER_GRAIN * self.flights.len() {
             // This crossing stays in the calendar, or is forgotten with the old cells.
             return self.think_over_cells(now);

@@ -72,19 +72,25 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         self.predict(grain);
     }
 
-    /// Goes back to `now` (s, epoch time), once those grains whose states have changed since have their old ones again: the others stand in the
+    /// Begins to note who crosses into another cell, for [`turn_back`](Self::turn_back) not to look at all grains.
+    pub fn forget_crossings(&mut self) {
+        self.crossed.clear();
+    }
+
+    /// Goes back to `now` (s, epoch time), since crossings were forgotten or later, once those grains whose states have changed since have their old ones again: the others stand in the
     /// cells of a later time.
     pub fn turn_back(&mut self, now: f64) {
         match &self.neighbors {
             Neighbors::Cells(cells) if !cells.were_there(now) => self.start_anew(now),
-            Neighbors::Cells(cells) => {
-                let strayed = |&grain: &u32| !cells.is_in_place(grain, self.flight(grain), now);
-                for grain in self.inside().filter(strayed).collect::<Vec<_>>() {
-                    let flight = *self.flight(grain);
-                    if let Neighbors::Cells(cells) = &mut self.neighbors {
-                        cells.remove(grain);
-                        cells.insert(grain, &flight, now);
+            Neighbors::Cells(_) => {
+                for grain in std::mem::take(&mut self.crossed) {
+                    let Neighbors::Cells(cells) = &mut self.neighbors else { return };
+                    let flight = self.flights[grain as usize];
+                    if is_vacant(&flight) || cells.is_in_place(grain, &flight, now) {
+                        continue;
                     }
+                    cells.remove(grain);
+                    cells.insert(grain, &flight, now);
                     self.release_partner(grain);
                     self.predict(grain);
                 }

@@ -16,32 +16,26 @@ use std::ops::ControlFlow;
 use impinge_events::calendar::{Buckets, Calendar};
 use impinge_events::{Flight, Surface};
 
-use self::sharing::{NOT_SHARED, SHARED, Sharing};
+use self::sharing::Sharing;
 use self::window::{Happened, Log};
 use super::collapse::Row;
 use super::{EventDriven, snapshot_of};
 use crate::grains::{Grain, Snapshot};
 use crate::scheme::{Broken, Observer, Progress};
 
-/// Copies are given up when they are so many times as far from the cut as those that are taken in.
-const LINGERING: f64 = 1.2;
-/// Who may soon have a copy is so many times as far from the cut as those that have one. Until somebody may have flown the difference nobody else is
-/// looked at.
-const NEAR: f64 = 2.0;
+/// All grains are looked at once in so many windows, at least: then the cut moves, the zone becomes thicker or thinner, and those are found whose copies
+/// may have to change before the next time.
+const SURVEY: f64 = 32.0;
 /// First window: the time in which the fastest grain flies this part of the zone in which there are copies.
-const FIRST_WINDOW: f64 = 0.2;
+const FIRST_WINDOW: f64 = 0.05;
 /// A window that went well is followed by one so many times as long, ...
 const LONGER: f64 = 1.03;
 /// ... or, as long as none has ended early, so many times.
-const MUCH_LONGER: f64 = 1.5;
+const MUCH_LONGER: f64 = 1.3;
 /// One that ended early is followed by one of this part of the time that it lasted, ...
 const SHORTER: f64 = 0.9;
 /// ... and at least this part of itself.
 const SHORTEST: f64 = 0.25;
-/// Where one half has more to do by this part, the cut moves towards it ...
-const UNEVEN: f64 = 0.02;
-/// ... by this part of the zone.
-const SHIFT: f64 = 0.05;
 
 /// Grains in free flight between events, as [`EventDriven`], in two halves that run at once. No grain may enter.
 #[derive(Clone, Debug)]
@@ -57,14 +51,11 @@ pub struct Halves<S: Surface, C: Calendar = Buckets> {
     collisions: u64,
     inside: usize,
     windows: Windows,
-    /// What there was since grains near the cut were found.
-    since_near: Since,
-}
-
-#[derive(Clone, Copy, Debug, Default)]
-struct Since {
-    events: usize,
-    windows: usize,
+    /// Copies that are to change before the next window.
+    renewals: [Vec<Renewal>; 2],
+    /// Events of each half, and windows, since all grains were looked at.
+    events: [usize; 2],
+    windows_surveyed: usize,
 }
 
 #[derive(Clone, Debug)]
@@ -85,6 +76,7 @@ pub struct Windows {
 }
 
 /// What becomes of the copy of a grain.
+#[derive(Clone, Debug)]
 struct Renewal {
     grain: u32,
     /// The state that it gets; none where it is given up.
@@ -109,7 +101,9 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
             collisions,
             inside,
             windows: Windows::default(),
-            since_near: Since::default(),
+            renewals: Default::default(),
+            events: [0; 2],
+            windows_surveyed: 0,
         };
         run.divide();
         run
@@ -176,13 +170,17 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
     /// Goes on for a window, not beyond `limit` (s, epoch time).
     fn run_window(&mut self, limit: f64, observer: &mut impl Observer) -> Result<(), Broken> {
         let from = self.now;
-        let until = limit.min(from + self.window.min(self.sharing.safe_for(self.sharing.fastest)));
+        let sharing = &mut self.sharing;
+        let until = limit.min(sharing.surveyed_until).min(from + self.window.min(sharing.safe_for(sharing.fastest)));
         self.windows.count += 1;
-        self.sharing.begin();
+        sharing.begin();
         let sharing = &self.sharing;
-        let run = |Half { engine, log }: &mut Half<S, C>| engine.run_window(until, sharing, log);
-        let [first, second] = &mut self.halves;
-        let (ours, theirs) = rayon::join(|| run(first), || run(second));
+        let run = |half: usize, Half { engine, log }: &mut Half<S, C>, renewals: &mut Vec<Renewal>| {
+            engine.renew(renewals, from);
+            engine.run_window(half, until, sharing, log)
+        };
+        let ([first, second], [for_first, for_second]) = (&mut self.halves, &mut self.renewals);
+        let (ours, theirs) = rayon::join(|| run(0, first, for_first), || run(1, second, for_second));
         if ours.is_err() || theirs.is_err() || self.halves.iter().any(|half| half.log.outrun) {
             return self.run_alone(until, observer);
         }
@@ -202,11 +200,12 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
         if self.now == from && events == 0 && until > from {
             return self.run_alone(until, observer);
         }
-        self.since_near.events += events;
-        self.since_near.windows += 1;
-        self.sharing.flown += (self.now - from) * self.sharing.fastest;
         self.tell(observer);
-        self.balance();
+        self.windows_surveyed += 1;
+        for (half, Half { log, .. }) in self.halves.iter().enumerate() {
+            self.events[half] += log.events.len();
+            self.sharing.watch(&log.to_watch);
+        }
         self.renew_copies();
         if self.now < until {
             self.windows.cut_short += 1;
@@ -255,103 +254,71 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
         }
     }
 
-    /// Moves the cut towards the half that has more to do.
-    fn balance(&mut self) {
-        let [first, second] = self.halves.each_ref().map(|half| half.log.events.len() as f64);
-        if (first - second).abs() > UNEVEN * (first + second) {
-            let way = SHIFT * self.sharing.zone;
-            self.sharing.cut.shift(way * (second - first).signum());
-            self.sharing.flown += way;
+    /// Looks at all grains: moves the cut towards the half that has more to do, makes the zone thicker or thinner, and finds all grains whose copies have
+    /// to change, or may have to until the next time.
+    fn survey(&mut self) {
+        let (events, windows) = (std::mem::take(&mut self.events), std::mem::take(&mut self.windows_surveyed));
+        if let Some(mean) = (events[0] + events[1]).checked_div(windows) {
+            self.sharing.balance(events);
+            self.sharing.adapt_zone(mean);
         }
-    }
-
-    /// Finds all grains that are so near the cut that they may soon have a copy, or have one.
-    fn find_near(&mut self) {
-        let Since { events, windows } = std::mem::take(&mut self.since_near);
-        if let Some(events) = events.checked_div(windows) {
-            self.sharing.adapt_zone(events);
-        }
+        self.sharing.surveyed_until = self.now + SURVEY * self.window;
         let of = |half: usize| {
             let (engine, sharing) = (&self.halves[half].engine, &self.sharing);
-            let (mut near, mut fastest) = (Vec::new(), 0.0_f64);
+            let (mut watched, mut fastest) = (Vec::new(), 0.0_f64);
             for grain in (0..sharing.owner.len() as u32).filter(|&grain| sharing.belongs_to(half, grain)) {
-                let (flight, copy) = (engine.encounters.flight(grain), sharing.wrong_since[grain as usize]);
+                let flight = engine.encounters.flight(grain);
                 fastest = fastest.max(sharing.speed(flight));
-                let is_near = || sharing.cut.depth(half, flight, self.now) < NEAR * sharing.zone;
-                if copy != NOT_SHARED || (engine.encounters.is_inside(grain) && is_near()) {
-                    near.push(grain);
+                if sharing.may_change(half, grain, flight, self.now) {
+                    watched.push(grain);
                 }
             }
-            (near, fastest)
+            (watched, fastest)
         };
-        let ((mut near, ours), (others, theirs)) = rayon::join(|| of(0), || of(1));
-        near.extend(others);
-        (self.sharing.near, self.sharing.flown, self.sharing.fastest) = (near, 0.0, ours.max(theirs));
+        let ((ours, our_fastest), (theirs, their_fastest)) = rayon::join(|| of(0), || of(1));
+        self.sharing.fastest = our_fastest.max(their_fastest);
+        self.sharing.watch_only([ours, theirs]);
     }
 
-    /// Hands grains over that have crossed the cut, and gives both halves copies of what is near it.
+    /// Hands grains over that have crossed the cut, and prepares that both halves get copies of what is near it.
     fn renew_copies(&mut self) {
-        if self.sharing.flown > (NEAR - 1.0) * self.sharing.zone {
-            self.find_near();
+        if self.now >= self.sharing.surveyed_until {
+            self.survey();
         }
-        let of = |half: usize| self.renewals(half);
-        let ((mut crossed, for_second), (others, for_first)) = rayon::join(|| of(0), || of(1));
-        crossed.extend(others);
-        for grain in crossed {
-            self.sharing.owner[grain as usize] ^= 1;
-        }
-        for renewal in for_first.iter().chain(&for_second) {
-            self.sharing.wrong_since[renewal.grain as usize] =
-                if renewal.state.is_some() { SHARED } else { NOT_SHARED };
-        }
-        let [first, second] = &mut self.halves;
-        let now = self.now;
-        rayon::join(|| first.engine.renew(&for_first, now), || second.engine.renew(&for_second, now));
-    }
-
-    /// Which grains of a half have gone over to the other one, and which copies there have to change.
-    fn renewals(&self, half: usize) -> (Vec<u32>, Vec<Renewal>) {
-        let (engine, sharing) = (&self.halves[half].engine, &self.sharing);
-        let (mut crossed, mut renewals) = (Vec::new(), Vec::new());
-        for grain in sharing.near.iter().copied().filter(|&grain| sharing.belongs_to(half, grain)) {
-            let copy = sharing.wrong_since[grain as usize];
-            if !engine.encounters.is_inside(grain) {
-                if copy != NOT_SHARED {
-                    renewals.push(Renewal { grain, state: None });
-                }
-                continue;
-            }
+        let watched = std::mem::take(&mut self.sharing.watched);
+        for &grain in &watched {
+            let half = self.sharing.owner_of(grain);
+            let engine = &self.halves[half].engine;
             let flight = engine.encounters.flight(grain);
-            let depth = sharing.cut.depth(half, flight, self.now);
-            if copy == SHARED {
-                if depth < 0.0 {
-                    crossed.push(grain);
-                } else if depth > LINGERING * sharing.zone {
-                    renewals.push(Renewal { grain, state: None });
+            let renewal = match self.sharing.change(grain, flight, self.now) {
+                None => continue,
+                Some(false) => Renewal { grain, state: None },
+                Some(true) => {
+                    let (carried, row) = (engine.grains[grain as usize], engine.rows.get(grain as usize));
+                    Renewal { grain, state: Some((*flight, carried, row.copied())) }
                 }
-            } else if depth < sharing.zone {
-                let (carried, row) = (engine.grains[grain as usize], engine.rows.get(grain as usize));
-                renewals.push(Renewal { grain, state: Some((*flight, carried, row.copied())) });
-            } else if copy != NOT_SHARED {
-                renewals.push(Renewal { grain, state: None });
-            }
+            };
+            self.renewals[1 - half].push(renewal);
         }
-        (crossed, renewals)
+        self.sharing.watched = watched;
     }
 
     /// Starts a new epoch for both halves, of the length that one engine would choose.
     fn start_epoch(&mut self) {
         let (after, extremes) = (self.now, self.halves.each_ref().map(|half| half.engine.extremes()));
         let (fastest, smallest) = (extremes[0].0.max(extremes[1].0), extremes[0].1.min(extremes[1].1));
-        let start = |Half { engine, .. }: &mut Half<S, C>| {
+        let start = |Half { engine, .. }: &mut Half<S, C>, renewals: &mut Vec<Renewal>| {
+            engine.renew(renewals, after);
             (engine.fastest, engine.smallest) = (fastest, smallest);
             let length = engine.epoch_of_extremes(after);
             engine.encounters.start_epoch(after, length);
             engine.begin(after, length);
         };
-        let [first, second] = &mut self.halves;
-        rayon::join(|| start(first), || start(second));
+        let ([first, second], [for_first, for_second]) = (&mut self.halves, &mut self.renewals);
+        rayon::join(|| start(first, for_first), || start(second, for_second));
         self.now = 0.0;
+        self.sharing.surveyed_until = 0.0;
+        self.renew_copies();
     }
 
     /// Starts the window again and goes on until `until` (s, epoch time) with one engine that has all grains.
@@ -359,7 +326,6 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
     fn run_alone(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Broken> {
         self.windows.alone += 1;
         self.undo([0, 0], self.now);
-        self.renew_copies();
         let [whole, other] = &mut self.halves;
         let theirs = (0..).zip(&self.sharing.owner).filter(|&(_, &owner)| owner == 1).map(|(grain, _)| grain);
         let theirs: Vec<u32> = theirs.filter(|&grain| other.engine.encounters.is_inside(grain)).collect();
@@ -395,7 +361,7 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
         };
         let [first, second] = &mut self.halves;
         rayon::join(|| keep(0, &mut first.engine), || keep(1, &mut second.engine));
-        self.find_near();
+        self.survey();
     }
 
     /// The grains inside, each in the half to which it belongs.
@@ -414,17 +380,17 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
 
 impl<S: Surface, C: Calendar> EventDriven<S, C> {
     /// Gives copies their new states, or gives them up, at `now` (s, epoch time).
-    fn renew(&mut self, renewals: &[Renewal], now: f64) {
-        for renewal in renewals {
+    fn renew(&mut self, renewals: &mut Vec<Renewal>, now: f64) {
+        for renewal in renewals.iter() {
             self.lift(renewal.grain);
         }
-        for Renewal { grain, state } in renewals {
+        for Renewal { grain, state } in renewals.drain(..) {
             let Some((flight, carried, row)) = state else { continue };
-            self.grains[*grain as usize] = *carried;
+            self.grains[grain as usize] = carried;
             if let Some(row) = row {
-                self.rows[*grain as usize] = *row;
+                self.rows[grain as usize] = row;
             }
-            self.put_down(*grain, *flight, now);
+            self.put_down(grain, flight, now);
         }
     }
 }

@@ -13,6 +13,10 @@ const COPIES: [f64; 2] = [0.1, 0.3];
 const EVENTS: [usize; 2] = [1500, 4000];
 /// By how much the zone is made thinner at once.
 const THINNER: f64 = 0.9;
+/// Copies are given up when they are so many times as far from the cut as those that are taken in.
+const LINGERING: f64 = 1.2;
+/// The cut moves so many zones at once, at the most.
+const SHIFT: f64 = 0.25;
 /// The zone in which there are copies is so many times as thick as the largest radius, at least.
 const LEAST_ZONE: f64 = 4.0;
 /// By this part grains keep farther from the cut than they must, so that it is no matter of rounding.
@@ -34,12 +38,12 @@ pub(super) struct Sharing {
     pub(super) margin: f64,
     /// Largest speed towards the cut that any grain has, or had lately, m/s.
     pub(super) fastest: f64,
-    /// All grains that are, or soon may be, so near the cut that they have a copy.
-    pub(super) near: Vec<u32>,
-    /// How far towards the cut a grain may have flown since these were found, m.
-    pub(super) flown: f64,
+    /// Until when (s, epoch time) those are known whose copies may have to change: those that are watched.
+    pub(super) surveyed_until: f64,
+    pub(super) watched: Vec<u32>,
+    is_watched: Vec<bool>,
     /// The copies that have gone wrong in this window.
-    pub(super) wrong: Vec<u32>,
+    wrong: Vec<u32>,
     /// When a grain whose copy is wrong first came to the cut, s (epoch time).
     strayed: f64,
     /// To which half each grain belongs.
@@ -71,15 +75,83 @@ impl Sharing {
                 wrong_since[grain as usize] = SHARED;
             }
         }
-        let (near, wrong) = (Vec::new(), Vec::new());
-        let (fastest, flown, strayed) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
-        Self { cut, zone, most_zone, margin, fastest, near, flown, wrong, strayed, owner, wrong_since }
+        let (watched, is_watched, wrong) = (Vec::new(), vec![false; slots], Vec::new());
+        let (fastest, surveyed_until, strayed) = (f64::INFINITY, now, f64::INFINITY);
+        Self {
+            cut,
+            zone,
+            most_zone,
+            margin,
+            fastest,
+            surveyed_until,
+            watched,
+            is_watched,
+            wrong,
+            strayed,
+            owner,
+            wrong_since,
+        }
     }
 
     /// How long no grain that only one half knows can come to the cut, s, where none is faster than `fastest` (m/s). On its own side it meets no grain
     /// that only the other half knows.
     pub(super) fn safe_for(&self, fastest: f64) -> f64 {
         (self.zone - self.margin) / fastest
+    }
+
+    /// Moves the cut towards the half that had more events.
+    pub(super) fn balance(&mut self, events: [usize; 2]) {
+        let [first, second] = events.map(|count| count as f64);
+        let uneven = (second - first) / (first + second).max(1.0);
+        self.cut.shift((uneven / COPIES[0]).clamp(-SHIFT, SHIFT) * self.zone);
+    }
+
+    /// Whether the copy of a grain that flies so at `now` (s, epoch time), or is gone, has to change, or may have to before all are looked at again.
+    #[inline]
+    pub(super) fn may_change(&self, half: usize, grain: u32, flight: &Flight, now: f64) -> bool {
+        let (depth, way) = (self.depth(half, flight, now), self.speed(flight) * (self.surveyed_until - now));
+        match self.is_shared(grain) {
+            true => depth < way || depth + way > LINGERING * self.zone,
+            false => depth < self.zone + way || self.wrong_since[grain as usize] != NOT_SHARED,
+        }
+    }
+
+    /// How far a grain is inside a half at `now` (s, epoch time), m; infinity where it is gone.
+    fn depth(&self, half: usize, flight: &Flight, now: f64) -> f64 {
+        if flight.radius > 0.0 { self.cut.depth(half, flight, now) } else { f64::INFINITY }
+    }
+
+    /// Decides about a grain that flies so at `now` (s, epoch time), or is gone: whether the half to which it does not belong has a copy from now on,
+    /// if that changes or the copy had gone wrong.
+    pub(super) fn change(&mut self, grain: u32, flight: &Flight, now: f64) -> Option<bool> {
+        let number = grain as usize;
+        let (depth, copy) = (self.depth(self.owner_of(grain), flight, now), self.wrong_since[number]);
+        if copy == SHARED && depth < 0.0 {
+            self.owner[number] ^= 1;
+            return None;
+        }
+        let is_near = depth < if copy == SHARED { LINGERING * self.zone } else { self.zone };
+        if is_near && copy == SHARED || !is_near && copy == NOT_SHARED {
+            return None;
+        }
+        self.wrong_since[number] = if is_near { SHARED } else { NOT_SHARED };
+        Some(is_near)
+    }
+
+    /// Watches these grains and no others.
+    pub(super) fn watch_only(&mut self, grains: [Vec<u32>; 2]) {
+        self.is_watched.fill(false);
+        self.watched.clear();
+        grains.iter().for_each(|grains| self.watch(grains));
+    }
+
+    /// Watches these grains too.
+    pub(super) fn watch(&mut self, grains: &[u32]) {
+        for &grain in grains {
+            if !std::mem::replace(&mut self.is_watched[grain as usize], true) {
+                self.watched.push(grain);
+            }
+        }
     }
 
     /// Makes the zone thicker where there are few events in a window, so that they become longer, and thinner where there are many.
@@ -110,9 +182,13 @@ impl Sharing {
         self.wrong_since[grain as usize] == SHARED
     }
 
+    pub(super) fn owner_of(&self, grain: u32) -> usize {
+        usize::from(self.owner[grain as usize])
+    }
+
     #[inline]
     pub(super) fn belongs_to(&self, half: usize, grain: u32) -> bool {
-        usize::from(self.owner[grain as usize]) == half
+        self.owner_of(grain) == half
     }
 
     /// Speed of a flight towards the cut or away from it, m/s.
@@ -123,7 +199,7 @@ impl Sharing {
 
     /// Notes where a grain whose copy is wrong has flown until `until` (s, epoch time).
     fn follow(&mut self, grain: u32, flight: &Flight, until: f64) {
-        let (owner, since) = (usize::from(self.owner[grain as usize]), self.wrong_since[grain as usize]);
+        let (owner, since) = (self.owner_of(grain), self.wrong_since[grain as usize]);
         let between = [flight.time.max(since), until];
         self.strayed =
             self.cut.stray(owner, flight, between, self.margin).map_or(self.strayed, |at| at.min(self.strayed));
@@ -132,12 +208,14 @@ impl Sharing {
     /// When a grain whose copy is wrong first came to the cut until `now` (s, epoch time), as `flight` tells what it does since its latest event; infinity
     /// where none did.
     pub(super) fn first_stray<'a>(&mut self, flight: impl Fn(usize, u32) -> &'a Flight, now: f64) -> f64 {
-        for grain in std::mem::take(&mut self.wrong) {
-            let flight = flight(usize::from(self.owner[grain as usize]), grain);
+        let wrong = std::mem::take(&mut self.wrong);
+        for &grain in &wrong {
+            let flight = flight(self.owner_of(grain), grain);
             if flight.radius > 0.0 {
                 self.follow(grain, flight, now);
             }
         }
+        self.watch(&wrong);
         self.strayed
     }
 

@@ -87,6 +87,8 @@ pub(super) struct Log {
     rows: Vec<[Row; 2]>,
     /// Which events have to do with grains that are known to both halves.
     pub(super) shared: Vec<u32>,
+    /// Grains of this half whose copies may have to change, as they fly now.
+    pub(super) to_watch: Vec<u32>,
     /// Largest speed towards the cut that a grain got, m/s.
     pub(super) fastest: f64,
     /// Whether a grain became too fast for the epoch.
@@ -113,6 +115,7 @@ impl Log {
         self.records.clear();
         self.rows.clear();
         self.shared.clear();
+        self.to_watch.clear();
         (self.fastest, self.outrun) = (0.0, false);
     }
 
@@ -142,8 +145,15 @@ impl Log {
 
 impl<S: Surface, C: Calendar> EventDriven<S, C> {
     /// Resolves all events up to `until` (s, epoch time) into `log`.
-    pub(super) fn run_window(&mut self, until: f64, sharing: &Sharing, log: &mut Log) -> Result<(), Broken> {
+    pub(super) fn run_window(
+        &mut self,
+        half: usize,
+        until: f64,
+        sharing: &Sharing,
+        log: &mut Log,
+    ) -> Result<(), Broken> {
         log.clear();
+        self.encounters.forget_crossings();
         while let Some((time, encounter)) = self.encounters.next_before(until) {
             let grains = match encounter {
                 Encounter::Grains { a, b } => [a, b],
@@ -165,7 +175,11 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             }
             self.resolve(time, encounter, log)?;
             for grain in event.grains() {
-                log.fastest = log.fastest.max(sharing.speed(self.encounters.flight(grain)));
+                let flight = self.encounters.flight(grain);
+                log.fastest = log.fastest.max(sharing.speed(flight));
+                if sharing.belongs_to(half, grain) && sharing.may_change(half, grain, flight, time) {
+                    log.to_watch.push(grain);
+                }
             }
             if self.outrun {
                 log.outrun = true;
