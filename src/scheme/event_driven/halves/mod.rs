@@ -177,7 +177,9 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
         let sharing = &self.sharing;
         let run = |half: usize, Half { engine, log }: &mut Half<S, C>, renewals: &mut Vec<Renewal>| {
             engine.renew(renewals, from);
-            engine.run_window(half, until, sharing, log)
+            engine.run_window(half, until, sharing, log)?;
+            engine.find_changes(half, until, sharing, log);
+            Ok::<(), Broken>(())
         };
         let ([first, second], [for_first, for_second]) = (&mut self.halves, &mut self.renewals);
         let (ours, theirs) = rayon::join(|| run(0, first, for_first), || run(1, second, for_second));
@@ -204,9 +206,9 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
         self.windows_surveyed += 1;
         for (half, Half { log, .. }) in self.halves.iter().enumerate() {
             self.events[half] += log.events.len();
-            self.sharing.watch(&log.to_watch);
+            self.sharing.watch(half, &log.to_watch);
         }
-        self.renew_copies();
+        self.renew_copies(until);
         if self.now < until {
             self.windows.cut_short += 1;
             self.window *= (SHORTER * (self.now - from) / self.window).max(SHORTEST);
@@ -277,30 +279,45 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
         };
         let ((ours, our_fastest), (theirs, their_fastest)) = rayon::join(|| of(0), || of(1));
         self.sharing.fastest = our_fastest.max(their_fastest);
-        self.sharing.watch_only([ours, theirs]);
+        self.sharing.watch_only([&ours, &theirs]);
     }
 
-    /// Hands grains over that have crossed the cut, and prepares that both halves get copies of what is near it.
-    fn renew_copies(&mut self) {
-        if self.now >= self.sharing.surveyed_until {
+    /// Hands grains over that have crossed the cut, and prepares that both halves get copies of what is near it. Whose copies change has been found for
+    /// the moment `found_for` (s, epoch time).
+    fn renew_copies(&mut self, found_for: f64) {
+        let is_time = self.now >= self.sharing.surveyed_until;
+        if is_time {
             self.survey();
         }
-        let watched = std::mem::take(&mut self.sharing.watched);
-        for &grain in &watched {
-            let half = self.sharing.owner_of(grain);
-            let engine = &self.halves[half].engine;
-            let flight = engine.encounters.flight(grain);
-            let renewal = match self.sharing.change(grain, flight, self.now) {
-                None => continue,
-                Some(false) => Renewal { grain, state: None },
-                Some(true) => {
-                    let (carried, row) = (engine.grains[grain as usize], engine.rows.get(grain as usize));
-                    Renewal { grain, state: Some((*flight, carried, row.copied())) }
-                }
-            };
-            self.renewals[1 - half].push(renewal);
+        if is_time || self.now < found_for {
+            let ([first, second], sharing, now) = (&mut self.halves, &self.sharing, self.now);
+            let find = |half, Half { engine, log }: &mut Half<S, C>| engine.find_changes(half, now, sharing, log);
+            rayon::join(|| find(0, first), || find(1, second));
         }
-        self.sharing.watched = watched;
+        for half in 0..2 {
+            let to_change = self.halves[half].log.to_change.iter().copied();
+            for grain in to_change.filter(|&grain| !self.sharing.is_wrong(grain)).collect::<Vec<_>>() {
+                self.renew_copy(grain);
+            }
+        }
+        for grain in std::mem::take(&mut self.sharing.wrong) {
+            self.renew_copy(grain);
+        }
+    }
+
+    fn renew_copy(&mut self, grain: u32) {
+        let half = self.sharing.owner_of(grain);
+        let engine = &self.halves[half].engine;
+        let flight = engine.encounters.flight(grain);
+        let state = match self.sharing.change(grain, flight, self.now) {
+            None => return,
+            Some(false) => None,
+            Some(true) => {
+                let (carried, row) = (engine.grains[grain as usize], engine.rows.get(grain as usize));
+                Some((*flight, carried, row.copied()))
+            }
+        };
+        self.renewals[1 - half].push(Renewal { grain, state });
     }
 
     /// Starts a new epoch for both halves, of the length that one engine would choose.
@@ -318,7 +335,7 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
         rayon::join(|| start(first, for_first), || start(second, for_second));
         self.now = 0.0;
         self.sharing.surveyed_until = 0.0;
-        self.renew_copies();
+        self.renew_copies(0.0);
     }
 
     /// Starts the window again and goes on until `until` (s, epoch time) with one engine that has all grains.

@@ -40,10 +40,11 @@ pub(super) struct Sharing {
     pub(super) fastest: f64,
     /// Until when (s, epoch time) those are known whose copies may have to change: those that are watched.
     pub(super) surveyed_until: f64,
-    pub(super) watched: Vec<u32>,
-    is_watched: Vec<bool>,
+    /// They stay listed when they go over to the other half.
+    pub(super) watched: [Vec<u32>; 2],
+    is_watched: Vec<[bool; 2]>,
     /// The copies that have gone wrong in this window.
-    wrong: Vec<u32>,
+    pub(super) wrong: Vec<u32>,
     /// When a grain whose copy is wrong first came to the cut, s (epoch time).
     strayed: f64,
     /// To which half each grain belongs.
@@ -75,7 +76,7 @@ impl Sharing {
                 wrong_since[grain as usize] = SHARED;
             }
         }
-        let (watched, is_watched, wrong) = (Vec::new(), vec![false; slots], Vec::new());
+        let (watched, is_watched, wrong) = (Default::default(), vec![[false; 2]; slots], Vec::new());
         let (fastest, surveyed_until, strayed) = (f64::INFINITY, now, f64::INFINITY);
         Self {
             cut,
@@ -121,6 +122,18 @@ impl Sharing {
         if flight.radius > 0.0 { self.cut.depth(half, flight, now) } else { f64::INFINITY }
     }
 
+    /// Whether there should be a copy of a grain that is so deep (m) inside its half; `copy` tells what there is.
+    fn is_near(&self, depth: f64, copy: f64) -> bool {
+        depth < if copy == SHARED { LINGERING * self.zone } else { self.zone }
+    }
+
+    /// Whether [`change`](Self::change) would do something.
+    pub(super) fn has_to_change(&self, half: usize, grain: u32, flight: &Flight, now: f64) -> bool {
+        let (depth, copy) = (self.depth(half, flight, now), self.wrong_since[grain as usize]);
+        let is_crossed = copy == SHARED && depth < 0.0;
+        is_crossed || copy != if self.is_near(depth, copy) { SHARED } else { NOT_SHARED }
+    }
+
     /// Decides about a grain that flies so at `now` (s, epoch time), or is gone: whether the half to which it does not belong has a copy from now on,
     /// if that changes or the copy had gone wrong.
     pub(super) fn change(&mut self, grain: u32, flight: &Flight, now: f64) -> Option<bool> {
@@ -128,28 +141,31 @@ impl Sharing {
         let (depth, copy) = (self.depth(self.owner_of(grain), flight, now), self.wrong_since[number]);
         if copy == SHARED && depth < 0.0 {
             self.owner[number] ^= 1;
+            self.watch(self.owner_of(grain), &[grain]);
             return None;
         }
-        let is_near = depth < if copy == SHARED { LINGERING * self.zone } else { self.zone };
-        if is_near && copy == SHARED || !is_near && copy == NOT_SHARED {
+        let is_near = self.is_near(depth, copy);
+        if copy == if is_near { SHARED } else { NOT_SHARED } {
             return None;
         }
         self.wrong_since[number] = if is_near { SHARED } else { NOT_SHARED };
         Some(is_near)
     }
 
-    /// Watches these grains and no others.
-    pub(super) fn watch_only(&mut self, grains: [Vec<u32>; 2]) {
-        self.is_watched.fill(false);
-        self.watched.clear();
-        grains.iter().for_each(|grains| self.watch(grains));
+    /// Watches these grains of each half and no others.
+    pub(super) fn watch_only(&mut self, grains: [&[u32]; 2]) {
+        self.is_watched.fill([false; 2]);
+        for half in 0..2 {
+            self.watched[half].clear();
+            self.watch(half, grains[half]);
+        }
     }
 
-    /// Watches these grains too.
-    pub(super) fn watch(&mut self, grains: &[u32]) {
+    /// Watches these grains of a half too.
+    pub(super) fn watch(&mut self, half: usize, grains: &[u32]) {
         for &grain in grains {
-            if !std::mem::replace(&mut self.is_watched[grain as usize], true) {
-                self.watched.push(grain);
+            if !std::mem::replace(&mut self.is_watched[grain as usize][half], true) {
+                self.watched[half].push(grain);
             }
         }
     }
@@ -182,6 +198,12 @@ impl Sharing {
         self.wrong_since[grain as usize] == SHARED
     }
 
+    /// Whether the other half has a copy of a grain that has gone wrong.
+    pub(super) fn is_wrong(&self, grain: u32) -> bool {
+        !self.is_shared(grain) && self.wrong_since[grain as usize] != NOT_SHARED
+    }
+
+    #[inline]
     pub(super) fn owner_of(&self, grain: u32) -> usize {
         usize::from(self.owner[grain as usize])
     }
@@ -215,7 +237,7 @@ impl Sharing {
                 self.follow(grain, flight, now);
             }
         }
-        self.watch(&wrong);
+        self.wrong = wrong;
         self.strayed
     }
 

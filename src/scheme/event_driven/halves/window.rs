@@ -89,6 +89,8 @@ pub(super) struct Log {
     pub(super) shared: Vec<u32>,
     /// Grains of this half whose copies may have to change, as they fly now.
     pub(super) to_watch: Vec<u32>,
+    /// Grains of this half whose copies have to change.
+    pub(super) to_change: Vec<u32>,
     /// Largest speed towards the cut that a grain got, m/s.
     pub(super) fastest: f64,
     /// Whether a grain became too fast for the epoch.
@@ -187,6 +189,15 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             }
         }
         Ok(())
+    }
+
+    /// Finds the grains of this half whose copies have to change at `now` (s, epoch time).
+    pub(super) fn find_changes(&self, half: usize, now: f64, sharing: &Sharing, log: &mut Log) {
+        let has_to_change = |&grain: &u32| {
+            sharing.belongs_to(half, grain) && sharing.has_to_change(half, grain, self.encounters.flight(grain), now)
+        };
+        log.to_change.clear();
+        log.to_change.extend(sharing.watched[half].iter().chain(&log.to_watch).copied().filter(has_to_change));
     }
 
     /// Undoes the events of `log` from number `first` on, and goes back to `now` (s, epoch time), before them.
