@@ -25,7 +25,7 @@ use crate::scheme::{Broken, Observer, Progress};
 
 /// All grains are looked at once in so many windows, at least: then the cut moves, the zone becomes thicker or thinner, and those are found whose copies
 /// may have to change before the next time.
-const SURVEY: f64 = 32.0;
+const SURVEY: f64 = 16.0;
 /// First window: the time in which the fastest grain flies this part of the zone in which there are copies.
 const FIRST_WINDOW: f64 = 0.05;
 /// A window that went well is followed by one so many times as long, ...
