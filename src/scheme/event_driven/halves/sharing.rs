@@ -7,17 +7,19 @@ use super::EventDriven;
 use super::cut::Cut;
 use super::window::{Happened, Log};
 
-/// This part of all grains have copies in the other half at first, and at the most: that much more work, and that much longer windows.
-const COPIES: [f64; 2] = [0.1, 0.3];
+/// This part of all grains have copies in the other half at the most: that much more work, and that much longer windows.
+const MOST_COPIES: f64 = 0.3;
 /// So many events in a window are neither too few, so that to put the halves together again costs too much, nor more than it takes.
 const EVENTS: [usize; 2] = [1500, 4000];
 /// By how much the zone is made thinner at once.
 const THINNER: f64 = 0.9;
 /// Copies are given up when they are so many times as far from the cut as those that are taken in.
 const LINGERING: f64 = 1.2;
-/// The cut moves so many zones at once, at the most.
-const SHIFT: f64 = 0.25;
-/// The zone in which there are copies is so many times as thick as the largest radius, at least.
+/// Where one half has more to do, by which part of all, the cut moves by so many times this part of the zone, ...
+const SHIFT: f64 = 10.0;
+/// ... and by this part at the most.
+const MOST_SHIFT: f64 = 0.25;
+/// The zone in which there are copies is so many times as thick as the largest radius, at first and at least.
 const LEAST_ZONE: f64 = 4.0;
 /// By this part grains keep farther from the cut than they must, so that it is no matter of rounding.
 const MARGIN: f64 = 1e-3;
@@ -64,10 +66,8 @@ impl Sharing {
         let mut sorted: Vec<f64> = depths.clone().map(f64::abs).collect();
         let margin = (1.0 + MARGIN) * engine.largest_radius();
         sorted.sort_unstable_by(f64::total_cmp);
-        let [zone, most_zone] = COPIES.map(|part| {
-            let copies = sorted.get((part * sorted.len() as f64) as usize).copied().unwrap_or_default();
-            copies.max(LEAST_ZONE * margin)
-        });
+        let zone = LEAST_ZONE * margin;
+        let most_zone = sorted.get((MOST_COPIES * sorted.len() as f64) as usize).copied().unwrap_or_default().max(zone);
         let slots = engine.grains.len();
         let (mut owner, mut wrong_since) = (vec![0; slots], vec![NOT_SHARED; slots]);
         for (&(grain, _), depth) in grains.iter().zip(depths) {
@@ -104,7 +104,7 @@ impl Sharing {
     pub(super) fn balance(&mut self, events: [usize; 2]) {
         let [first, second] = events.map(|count| count as f64);
         let uneven = (second - first) / (first + second).max(1.0);
-        self.cut.shift((uneven / COPIES[0]).clamp(-SHIFT, SHIFT) * self.zone);
+        self.cut.shift((SHIFT * uneven).clamp(-MOST_SHIFT, MOST_SHIFT) * self.zone);
     }
 
     /// Whether the copy of a grain that flies so at `now` (s, epoch time), or is gone, has to change, or may have to before all are looked at again.
