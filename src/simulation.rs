@@ -1,6 +1,6 @@
 //! A scene made ready to run.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, RangeInclusive};
 use std::path::Path;
 
 use impinge_events::Domain;
@@ -12,12 +12,18 @@ use crate::law::{NearField, Term};
 use crate::near_field::{Bound, CutOff, ForceSum, Method};
 use crate::scene::{Boundary, Interference, Invalid, Scene, Substep, Summation};
 use crate::scheme::stepped::{Comparator, Crowd, Stepped, Steps};
-use crate::scheme::{Broken, EventDriven, Forces, Laws, Length, Moments, Observer, Progress, SubSteps, Substepped};
+use crate::scheme::{
+    Broken, EventDriven, Forces, Halves, Laws, Length, Moments, Observer, Progress, SubSteps, Substepped,
+};
 use crate::source::{self, Displacement, Nozzle, Placed};
 use crate::surface::Surface;
 
 /// Skin of the neighbour lists of a near field with a cut-off, over the cut-off.
 const SKIN: f64 = 0.15;
+
+/// Two cores share the work on so many grains: fewer keep one core busy with little more than what both have to compare, and with more the memory for
+/// both halves counts.
+const FOR_TWO_CORES: RangeInclusive<usize> = 30_000..=3_000_000;
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -171,7 +177,7 @@ impl Simulation {
     /// Grains between which there is no finite force.
     pub fn sub_steps(&mut self) -> Result<Option<SubSteps>, Broken> {
         match &mut self.scheme {
-            Advance::Freely(_) | Advance::Stepped(_) => Ok(None),
+            Advance::Freely(_) | Advance::OnTwoCores(_) | Advance::Stepped(_) => Ok(None),
             Advance::UnderForces(scheme) => scheme.report().map(Some),
         }
     }
@@ -180,7 +186,7 @@ impl Simulation {
     #[must_use]
     pub fn steps(&self) -> Option<Steps> {
         match &self.scheme {
-            Advance::Freely(_) | Advance::UnderForces(_) => None,
+            Advance::Freely(_) | Advance::OnTwoCores(_) | Advance::UnderForces(_) => None,
             Advance::Stepped(scheme) => Some(scheme.steps()),
         }
     }
@@ -189,7 +195,7 @@ impl Simulation {
     #[must_use]
     pub fn planned_step(&self) -> Option<f64> {
         match &self.scheme {
-            Advance::Freely(_) | Advance::UnderForces(_) => None,
+            Advance::Freely(_) | Advance::OnTwoCores(_) | Advance::UnderForces(_) => None,
             Advance::Stepped(scheme) => scheme.method().planned_step(),
         }
     }
@@ -232,6 +238,8 @@ impl Simulation {
 enum Advance {
     /// Nothing acts between events.
     Freely(Box<EventDriven<Surface>>),
+    /// The same, and two cores share the work.
+    OnTwoCores(Box<Halves<Surface>>),
     /// In sub-steps.
     UnderForces(Box<Substepped<Surface>>),
     /// In steps.
@@ -248,11 +256,13 @@ impl Advance {
             return Ok(Self::Stepped(Box::new(Stepped::new(crowd, comparator))));
         }
         let engine = EventDriven::new(&placed.grains, surface, domain, laws, scene.run.start);
-        Ok(match scene.has_forces() {
-            true => {
-                let scheme = Substepped::new(engine, forces, laws, length(scene)).keeping_to(scene.penetration());
-                Self::UnderForces(Box::new(scheme))
-            }
+        if scene.has_forces() {
+            let scheme = Substepped::new(engine, forces, laws, length(scene)).keeping_to(scene.penetration());
+            return Ok(Self::UnderForces(Box::new(scheme)));
+        }
+        let pays = placed.nozzles.is_empty() && FOR_TWO_CORES.contains(&placed.grains.len());
+        Ok(match pays && rayon::current_num_threads() > 1 {
+            true => Self::OnTwoCores(Box::new(Halves::of(engine))),
             false => Self::Freely(Box::new(engine)),
         })
     }
@@ -265,6 +275,7 @@ impl Advance {
     ) -> Result<ControlFlow<()>, Broken> {
         match self {
             Self::Freely(engine) => engine.advance(end, observer, watch),
+            Self::OnTwoCores(halves) => halves.advance(end, observer, watch),
             Self::UnderForces(scheme) => scheme.advance(end, observer, watch),
             Self::Stepped(scheme) => scheme.advance(end, observer, watch),
         }
@@ -273,7 +284,7 @@ impl Advance {
     /// Tells the observer what forces did and shows it all grains.
     fn sample(&mut self, time: f64, observer: &mut impl Observer) -> Result<(), Broken> {
         match self {
-            Self::Freely(_) => {}
+            Self::Freely(_) | Self::OnTwoCores(_) => {}
             Self::UnderForces(scheme) => scheme.tell(time, observer)?,
             Self::Stepped(scheme) => scheme.tell(observer)?,
         }
@@ -284,6 +295,7 @@ impl Advance {
     fn snapshot(&self, time: f64, look: impl FnOnce(&Snapshot<'_>)) {
         match self {
             Self::Freely(engine) => engine.snapshot(time, look),
+            Self::OnTwoCores(halves) => halves.snapshot(time, look),
             Self::UnderForces(scheme) => scheme.engine().snapshot(time, look),
             Self::Stepped(scheme) => scheme.crowd().snapshot(time, look),
         }
@@ -292,6 +304,7 @@ impl Advance {
     fn enter(&mut self, time: f64, grain: &NewGrain, observer: &mut impl Observer) {
         match self {
             Self::Freely(engine) => engine.enter(time, grain, observer),
+            Self::OnTwoCores(_) => unreachable!("no grain enters where two cores share the work"),
             Self::UnderForces(scheme) => scheme.enter(time, grain, observer),
             Self::Stepped(scheme) => scheme.enter(grain, observer),
         }
@@ -301,6 +314,7 @@ impl Advance {
     fn is_free(&self, place: Vector3<f64>, radius: f64, time: f64) -> bool {
         match self {
             Self::Freely(engine) => engine.is_free(place, radius, time),
+            Self::OnTwoCores(_) => unreachable!("no grain enters where two cores share the work"),
             Self::UnderForces(scheme) => scheme.engine().is_free(place, radius, time),
             Self::Stepped(scheme) => scheme.crowd().is_free(place, radius),
         }
@@ -316,6 +330,7 @@ impl Advance {
     fn surface(&self) -> &Surface {
         match self {
             Self::Freely(engine) => engine.surface(),
+            Self::OnTwoCores(halves) => halves.surface(),
             Self::UnderForces(scheme) => scheme.engine().surface(),
             Self::Stepped(scheme) => scheme.crowd().surface(),
         }
@@ -325,6 +340,7 @@ impl Advance {
     fn surface_time(&self) -> f64 {
         match self {
             Self::Freely(engine) => engine.epoch_start(),
+            Self::OnTwoCores(halves) => halves.epoch_start(),
             Self::UnderForces(scheme) => scheme.engine().epoch_start(),
             Self::Stepped(scheme) => scheme.crowd().time(),
         }
@@ -334,6 +350,7 @@ impl Advance {
     fn time(&self) -> f64 {
         match self {
             Self::Freely(engine) => engine.time(),
+            Self::OnTwoCores(halves) => halves.time(),
             Self::UnderForces(scheme) => scheme.engine().time(),
             Self::Stepped(scheme) => scheme.crowd().time(),
         }

@@ -3,6 +3,8 @@
 
 mod common;
 
+use std::ops::ControlFlow;
+
 use common::forced::{Scene, advance, attraction, block, floor, look, plane, rough, states};
 use common::{Log, smooth};
 use impinge::grains::NewGrain;
@@ -10,6 +12,7 @@ use impinge::law::NearField;
 use impinge::observe::Ledger;
 use impinge::scene::DEFAULT_PENETRATION;
 use impinge::scheme::{Laws, Length, SubSteps, Substepped};
+use impinge::simulation::Simulation;
 use impinge::surface::Surface;
 use nalgebra::Vector3;
 use rand::{RngExt as _, SeedableRng as _};
@@ -148,6 +151,38 @@ fn a_cluster_under_strong_attraction_keeps_to_the_tolerance() {
     }
 }
 
+/// Nothing rests, and who is deflected towards whom within a sub-step nobody knows at its kick: such parts run on a copy first. (Before they did, these went
+/// 6.2e-4 and 2.4e-4 radii deep.) How often somebody looks changes nothing.
+#[test]
+fn grains_that_lose_nothing_keep_to_the_tolerance_in_sub_steps_far_too_long() {
+    let example = std::fs::read_to_string("examples/agglomerate.toml").expect("an example");
+    for alpha in ["2e-5", "1e-3"] {
+        let [seldom, often] = [3, 40].map(|frames| {
+            let changes = [
+                ("restitution = 0.5", "restitution = 1.0".to_owned()),
+                ("friction = 0.3", "friction = 0.0".to_owned()),
+                ("until = 2.0", "until = 4.0".to_owned()),
+                ("frames = 40", format!("frames = {frames}")),
+                ("alpha1 = 2e-5", format!("alpha1 = {alpha}")),
+                ("substep = 5e-4", "substep = 4e-3".to_owned()),
+            ];
+            let text = changes.iter().fold(example.clone(), |text, (from, to)| {
+                assert!(text.contains(from), "{from}");
+                text.replace(from, to)
+            });
+            let mut simulation =
+                Simulation::new(&toml::from_str(&text).expect("a scene"), ".".as_ref()).expect("a run");
+            let mut ledger = Ledger::default();
+            simulation.run(&mut ledger, &mut |_| ControlFlow::Continue(())).expect("no broken invariant");
+            let deepest = ledger.max_overlap_over_radius();
+            assert!(deepest <= DEFAULT_PENETRATION, "attraction {alpha} N m²: {deepest:e}");
+            (deepest, simulation.sub_steps().expect("finite forces").expect("sub-steps"))
+        });
+        assert!(seldom.1.split > 0);
+        assert_eq!(seldom, often);
+    }
+}
+
 /// Without a sub-step in the scene it is chosen so that its error stays small; that alone does not keep grains apart.
 #[test]
 fn chosen_sub_steps_keep_to_the_tolerance() {
@@ -173,14 +208,16 @@ fn what_keeps_to_the_tolerance_anyway_keeps_every_bit() {
 
 #[test]
 fn one_thread_and_two_split_alike() {
-    let [one, two] = [1, 2].map(|threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-        pool.install(|| {
-            let mut run = cluster(rough(0.5, 0.3), 100.0).start(Length::Fixed(2e-3));
-            advance(&mut run, 0.5, &mut ());
-            (states(&run, 0.5), run.report().expect("finite forces"))
-        })
-    });
-    assert!(one.1.split > 0);
-    assert_eq!(one, two);
+    for (laws, until) in [(rough(0.5, 0.3), 0.5), (smooth(1.0, 1.0), 0.5)] {
+        let [one, two] = [1, 2].map(|threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            pool.install(|| {
+                let mut run = cluster(laws, 100.0).start(Length::Fixed(2e-3));
+                advance(&mut run, until, &mut ());
+                (states(&run, until), run.report().expect("finite forces"))
+            })
+        });
+        assert!(one.1.split > 0);
+        assert_eq!(one, two);
+    }
 }

@@ -6,6 +6,9 @@
 //! times gravity where a pile is hit. At each kick, when these forces are known, all pairs that may meet are looked at, and where one would go too
 //! deep the sub-step is halved, and halved again, for all: the forces of a shorter one are found anew. What is left of it follows in parts
 //! as long as they may be.
+//!
+//! Who is deflected towards whom within a part is not known then. So where a part may be too long even for that ([`Bound`]) it first runs on a copy,
+//! and if grains go too deep it is taken back and halved.
 
 use impinge_events::contact_time::MOST_SLACKS;
 use impinge_events::{Flight, Vicinity, YIELDING};
@@ -20,6 +23,10 @@ const SHARE: f64 = 0.75;
 const LEAST_SHARE: f64 = 1.0 - SHARE;
 /// Parts become twice as long when this part of what is allowed is used: then four times as much still is a little less.
 const ROOM: f64 = 0.22;
+
+/// Without contacts at rest forces may become so many times as strong from one kick to the next, and a copy is at hand where it will be needed. Where there is
+/// none the bound decides.
+const FORESIGHT: f64 = 4.0;
 
 /// The parts of a sub-step, of which each is the sub-step halved some times. One that is not split is its only part.
 #[derive(Clone, Debug)]
@@ -68,6 +75,17 @@ impl Parts {
         if self.room && self.taken.is_multiple_of(ticks(fewer)) { fewer } else { self.halvings }
     }
 
+    /// Whether the current part may stand, in which grains went so deep into each other, over the smaller radius.
+    pub(super) fn stands(&mut self, deepest: f64) -> bool {
+        self.room &= deepest < ROOM * self.penetration;
+        deepest <= self.penetration || self.halvings == MOST_HALVINGS
+    }
+
+    /// Makes the next part shorter than this one of the same sub-step was.
+    pub(super) fn take_back(&mut self, part: &Self) {
+        (self.halvings, self.room) = (part.halvings + 1, false);
+    }
+
     /// Goes on to the next part of a sub-step of length `step` (s) and gives its length (s). `depth` prepares a part of the length that it is given (s) and
     /// tells how deep grains may go into each other in it, over how deep they may.
     pub(super) fn next(&mut self, step: f64, mut depth: impl FnMut(f64) -> f64) -> f64 {
@@ -105,6 +123,35 @@ fn ticks(halvings: u32) -> u32 {
     1 << (MOST_HALVINGS - halvings)
 }
 
+/// What bounds how deep grains may go into each other, whoever meets whom.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bound {
+    /// Strongest pull on a grain, without what contacts carry, m/s²: chords of contacts may yield in proportion to it.
+    pub(super) strongest: f64,
+    /// Largest acceleration of a grain less what all have in common, m/s²: the paths of two grains are nearer than their chords by twice as much times
+    /// h²/8 at the most.
+    pub(super) bend: f64,
+}
+
+impl Bound {
+    /// Of forces about which nothing is known.
+    pub(super) const UNKNOWN: Self = Self { strongest: f64::INFINITY, bend: f64::INFINITY };
+
+    /// How deep grains may go in a part of this length (s), over `penetration`, which is over the smallest radius (m), as are both.
+    pub(super) fn depth(&self, length: f64, radius: f64, penetration: f64) -> f64 {
+        let sag = 0.125 * length * length / radius;
+        let yielded = MOST_SLACKS * (YIELDING + (self.strongest * sag).min(most_sag(penetration)));
+        (yielded + 2.0 * self.bend * sag) / penetration
+    }
+
+    /// Whether the next part, if it is so long (s), may need a copy to go back to.
+    pub(super) fn is_near(&self, length: f64, radius: f64, penetration: f64) -> bool {
+        let Self { strongest, bend } = self;
+        let stronger = Self { strongest: FORESIGHT * strongest, bend: FORESIGHT * bend };
+        stronger.depth(length, radius, penetration) > 1.0
+    }
+}
+
 /// All grains at a kick.
 pub(super) struct Bends<'a> {
     /// With the velocities of their chords of the sub-step before.
@@ -119,6 +166,12 @@ pub(super) struct Bends<'a> {
 }
 
 impl Bends<'_> {
+    /// The largest acceleration of a grain less gravity, m/s².
+    pub(super) fn bend(&self) -> f64 {
+        let inside = self.accelerations.iter().zip(self.flights).filter(|(_, flight)| flight.radius > 0.0);
+        inside.map(|(acceleration, _)| (acceleration - self.gravity).norm()).fold(0.0, f64::max)
+    }
+
     /// How deep grains may go into each other in the next sub-step, over `penetration`, which is over the smaller radius.
     ///
     /// Where there are contacts at rest, `pressing` is the largest acceleration without them (m/s²), and 0 else: when chords depart from paths

@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 use rustc_hash::FxHashMap;
 
 use super::event_driven::{AtRest, Held, Under};
-use super::penetration::{Bends, Parts, most_sag};
+use super::penetration::{Bends, Bound, Parts, most_sag};
 use super::resting::Resting;
 use super::{Broken, EventDriven, Kick, Laws, Observer, Passage, Progress, Rest};
 use crate::grains::{Grain, NewGrain, kinetic_energy};
@@ -88,6 +88,8 @@ pub struct Substepped<S: Surface, C: Calendar = Buckets> {
     step: f64,
     /// How they are split. What is said of a sub-step below holds of a part where there are such.
     parts: Parts,
+    /// What bounds how deep grains may go into each other, as of the last kick.
+    bound: Bound,
     /// Length of the sub-step that has ended, s.
     ended: f64,
     /// End of the current sub-step, simulated time, s.
@@ -268,6 +270,7 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             length,
             step: 0.0,
             parts: Parts::new(DEFAULT_PENETRATION),
+            bound: Bound::UNKNOWN,
             ended: 0.0,
             step_end,
             pull: Vec::new(),
@@ -317,7 +320,7 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
                     self.choose_step()?;
                     self.steps += 1;
                 }
-                self.kick()?;
+                self.start_part()?;
             }
             let until = end.min(self.step_end);
             if self.engine.advance(until, &mut (&mut self.passages, &mut *observer), watch)?.is_break() {
@@ -399,8 +402,31 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
         Ok(apart)
     }
 
-    /// Ends a sub-step and starts the next.
-    fn kick(&mut self) -> Result<(), Broken> {
+    /// Starts the next part of a sub-step, as long as it may be for nobody to go too deep.
+    ///
+    /// Grains that enter within it are not foreseen.
+    fn start_part(&mut self) -> Result<(), Broken> {
+        let (radius, penetration) = (self.engine.smallest_radius(), self.parts.penetration());
+        // Contact forces come and go from kick to kick.
+        let needs_copy = self.at_rest == AtRest::Carried
+            && (!self.resting.is_empty() || self.bound.is_near(self.parts.longest(self.step), radius, penetration));
+        let before = needs_copy.then(|| self.clone());
+        self.kick(needs_copy)?;
+        let Some(before) = before else { return Ok(()) };
+        while self.bound.depth(self.ended, radius, penetration) > 1.0 {
+            let deepest = self.engine.deepest_until(self.step_end);
+            if self.parts.stands(deepest) {
+                break;
+            }
+            let too_long = std::mem::replace(self, before.clone()).parts;
+            self.parts.take_back(&too_long);
+            self.kick(true)?;
+        }
+        Ok(())
+    }
+
+    /// Ends a sub-step and starts the next, which can be taken back or not.
+    fn kick(&mut self, can_go_back: bool) -> Result<(), Broken> {
         let ended = self.ended;
         let held = self.engine.take_held();
         self.books.held(&held);
@@ -428,9 +454,10 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             books,
             step,
             strengths,
+            bound,
             ..
         } = self;
-        let whole = *step;
+        let (whole, smallest) = (*step, engine.smallest_radius());
         let carries = *at_rest == AtRest::Carried;
         let strongest = pull.iter().map(|pull| pull.norm()).fold(forces.gravity.norm(), f64::max);
         let reach = Resting::reach(engine.largest_radius(), 2.0 * strongest, parts.longest(whole));
@@ -450,6 +477,7 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             end.extend_from_slice(accelerations);
             outcome = forces.pull(grains, flights, *strengths, pull);
             let strongest = pull.iter().map(|pull| pull.norm()).fold(0.0, f64::max);
+            *bound = Bound { strongest, bend: 0.0 };
             let step = parts.next(whole, |step| {
                 accelerations.copy_from_slice(pull);
                 if !carries {
@@ -463,7 +491,10 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
                 }
                 let bends = Bends { flights, accelerations, gravity, ended, step };
                 let pressing = if resting.is_empty() { 0.0 } else { strongest };
-                bends.deepest(vicinity, pressing, penetration)
+                // What a surface begins to carry is no longer pulled.
+                bound.bend = bends.bend().max(pressing);
+                let surely = if can_go_back { 0.0 } else { bound.depth(step, smallest, penetration) };
+                bends.deepest(vicinity, pressing, penetration).max(surely)
             });
             length = step;
             let both = 0.5 * (ended + step);

@@ -556,7 +556,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         if self.everywhere > 0 {
             self.crossed.push(grain);
         }
-        if self.crossings > CROSSINGS_PER_GRAIN * self.flights.len() {
+        if self.crossings > CROSSINGS_PER_GRAIN * self.count {
             // This crossing stays in the calendar, or is forgotten with the old cells.
             return self.think_over_cells(now);
         }

@@ -113,6 +113,25 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         self.resume(next);
     }
 
+    /// How deep the two grains that overlap most are in each other at `time` (s, epoch time), up to which all is resolved, over the smaller radius; 0 where
+    /// none overlap.
+    #[must_use]
+    pub fn deepest_overlap(&self, time: f64) -> f64 {
+        let place = |grain: u32| self.flight(grain).position_at(time) + self.bend(grain).offset(time);
+        let (mut deepest, mut near) = (0.0_f64, Near::default());
+        for a in self.inside() {
+            let (ours, radius) = (place(a), self.flight(a).radius);
+            near.clear();
+            self.neighbors.add(a, &mut near);
+            for (b, shift) in near.iter().filter(|&(b, _)| a < b) {
+                let other = self.flight(b).radius;
+                let overlap = radius + other - (place(b) + shift - ours).norm();
+                deepest = deepest.max(overlap / radius.min(other));
+            }
+        }
+        deepest
+    }
+
     /// All pairs of grains, standing at time 0, that are nearer to each other than `reach` (m), in the order of their numbers.
     fn touches(&self, reach: f64) -> Vec<Touch> {
         let (mut touches, mut near) = (Vec::new(), Near::default());

@@ -2,8 +2,11 @@
 
 use crate::prefetch::prefetch;
 
-/// Slots for each grain, at least: more cost memory, fewer are shared by cells.
+/// Slots for each grain, at least; cells are no smaller than to have one each.
 const SLOTS_PER_GRAIN: usize = 4;
+/// A hashed table has so many times as many, so that few strangers share a slot, where there are no more grains than these: beyond, memory counts more.
+const SPARSE: usize = 4;
+const MOST_SPARSE: usize = 1 << 17;
 /// Fewest slots.
 const FEWEST: usize = 64;
 
@@ -29,7 +32,10 @@ impl Slots {
         let (slots, mask) = match cells {
             // The first and the last slot have none beside them.
             Some(cells) => (cells + 2, usize::MAX),
-            None => (slots(grains), slots(grains) - 1),
+            None => {
+                let slots = if grains > MOST_SPARSE { slots(grains) } else { SPARSE * slots(grains) };
+                (slots, slots - 1)
+            }
         };
         Self { mask, first: vec![nobody; slots], occupied: vec![0; slots] }
     }

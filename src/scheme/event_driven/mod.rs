@@ -96,6 +96,8 @@ pub struct EventDriven<S: Surface, C: Calendar = Buckets> {
     since_watch: u32,
     /// Encounters since `mark` (epoch time, s).
     since_mark: u64,
+    /// How deep anybody has gone into anything, over the radius.
+    deepest: f64,
     mark: f64,
 }
 
@@ -129,6 +131,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             collisions: 0,
             since_watch: 0,
             since_mark: 0,
+            deepest: 0.0,
             mark: 0.0,
         };
         scheme.start_epoch(0.0);
@@ -562,7 +565,8 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
 
     /// Stops the run where an invariant is broken.
     #[inline]
-    fn check(&self, time: f64, ids: &[u64], overlap: f64, velocities: &[Vector3<f64>]) -> Result<(), Broken> {
+    fn check(&mut self, time: f64, ids: &[u64], overlap: f64, velocities: &[Vector3<f64>]) -> Result<(), Broken> {
+        self.deepest = self.deepest.max(overlap);
         let numbers = velocities.iter().all(|velocity| velocity.norm_squared().is_finite());
         let allowed = if self.force.acts { LARGEST_OVERLAP_WITH_FORCES } else { LARGEST_OVERLAP };
         if overlap <= allowed && numbers {

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use std::ops::ControlFlow;
+
 use impinge_events::calendar::Calendar;
 use impinge_events::{Bend, Flight, Surface, SurfaceContact, Vicinity};
 use nalgebra::Vector3;
@@ -105,6 +107,21 @@ pub(super) struct UnderForce {
     pub(super) held: Held,
     /// Who pushes whom; kept for its memory.
     pub(super) pressed: Pressed,
+}
+
+impl<S: Surface + Clone, C: Calendar + Clone> EventDriven<S, C> {
+    /// How deep grains will have gone into each other or the surface, over the radius, by the end of the sub-step at simulated time `end` (s), if nobody
+    /// enters. Between collisions paths are farthest from chords in the middle.
+    pub(in crate::scheme) fn deepest_until(&mut self, end: f64) -> f64 {
+        let mut ahead = Self { deepest: 0.0, ..self.clone() };
+        for time in [0.5 * (self.time + end), end] {
+            if ahead.advance(time, &mut (), &mut |_| ControlFlow::Continue(())).is_err() {
+                return f64::INFINITY;
+            }
+            ahead.deepest = ahead.deepest.max(ahead.encounters.deepest_overlap(time - self.epoch_start));
+        }
+        ahead.deepest
+    }
 }
 
 impl<S: Surface, C: Calendar> EventDriven<S, C> {

@@ -37,7 +37,38 @@ const SHORTER: f64 = 0.9;
 /// ... and at least this part of itself.
 const SHORTEST: f64 = 0.25;
 
-/// Grains in free flight between events, as [`EventDriven`], in two halves that run at once. No grain may enter.
+/// Grains in free flight between events, as [`EventDriven`], in two halves that run at once in the thread pool of rayon. No grain may enter.
+///
+/// It pays from some ten thousand grains on, and takes twice the memory. Inside the pool (`ThreadPool::install`) no thread has to be woken from outside.
+///
+/// ```
+/// use std::ops::ControlFlow;
+///
+/// use impinge::grains::NewGrain;
+/// use impinge::law::{ContactLaw, Friction};
+/// use impinge::scene::Interference;
+/// use impinge::scheme::{Collapse, EventDriven, Halves, Laws};
+/// use impinge_events::{Domain, NoSurface};
+/// use nalgebra::Vector3;
+///
+/// let ball = |x: f64, vx: f64| NewGrain {
+///     position: Vector3::new(x, 0.0, 0.0),
+///     velocity: Vector3::new(vx, 0.0, 0.0),
+///     spin: Vector3::zeros(),
+///     radius: 0.5,
+///     density: 1.0,
+///     strength: 1.0,
+/// };
+/// let law = ContactLaw { restitution: 1.0, friction: Friction::Smooth };
+/// let laws = Laws { grain: law, surface: law, interference: Interference::All, collapse: Collapse::Elastic };
+/// let balls = [ball(0.0, 1.0), ball(3.0, 0.0), ball(9.0, 0.0)];
+/// let mut one = EventDriven::new(&balls, NoSurface, Domain::unbounded(), laws, 0.0);
+/// let mut two = Halves::of(one.clone());
+/// let go_on = &mut |_| ControlFlow::Continue(());
+/// assert!(one.advance(10.0, &mut (), go_on)?.is_continue() && two.advance(10.0, &mut (), go_on)?.is_continue());
+/// assert!(one.snapshot(10.0, |one| two.snapshot(10.0, |two| one.flights == two.flights)));
+/// # Ok::<(), impinge::scheme::Broken>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Halves<S: Surface, C: Calendar = Buckets> {
     halves: [Half<S, C>; 2],

@@ -155,9 +155,9 @@ impl Sharing {
     /// Watches these grains of each half and no others.
     pub(super) fn watch_only(&mut self, grains: [&[u32]; 2]) {
         self.is_watched.fill([false; 2]);
-        for half in 0..2 {
+        for (half, grains) in grains.into_iter().enumerate() {
             self.watched[half].clear();
-            self.watch(half, grains[half]);
+            self.watch(half, grains);
         }
     }
 
