@@ -7,8 +7,10 @@ use std::ops::ControlFlow;
 use common::{Log, gas, smooth};
 use impinge::grains::{Grain, NewGrain};
 use impinge::law::{ContactLaw, Friction};
+use impinge::observe::Ledger;
 use impinge::scene::{self, Interference, Scene};
 use impinge::scheme::{Collapse, EventDriven, Halves, Laws, Windows};
+use impinge::simulation::Simulation;
 use impinge::source;
 use impinge::surface::Surface;
 use impinge_events::{Domain, Flight};
@@ -210,4 +212,37 @@ fn jets_of_each_interference() {
         let (_, log) = jet(2000, Domain::unbounded(), laws).compare(0.06, 3);
         assert!(log.surface_hits() > 50, "{interference:?}: {} hits", log.surface_hits());
     }
+}
+
+/// The command's way: many grains on more than one thread are shared between two cores, and what is told is the same.
+#[test]
+fn a_scene_of_many_grains_runs_alike_on_one_thread_and_two() {
+    let text = r#"
+        run.until = 0.3
+        domain = { min = [0, 0, 0], max = [20, 20, 20], boundary = "periodic" }
+        grain = { radius = 0.3, density = 1000.0 }
+        contact.grain.restitution = 0.9
+        output.samples = 4
+        source = [{ kind = "lattice", arrangement = "face-centred", cells = [20, 20, 20], min = [0, 0, 0],
+            max = [20, 20, 20], velocity = [0, 0, 0], thermal_speed = 1.0 }]
+    "#;
+    let [one, two] = [1, 2].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| {
+            let scene: Scene = toml::from_str(text).expect("a scene");
+            let mut simulation = Simulation::new(&scene, ".".as_ref()).expect("a run");
+            let mut told = (Log::default(), Ledger::default());
+            let mut calls = 0;
+            let outcome = simulation.run(&mut told, &mut |_| {
+                calls += 1;
+                ControlFlow::Continue(())
+            });
+            assert_eq!(outcome.expect("no broken invariant").time, 0.3);
+            (told.0.0, told.1.energy_residual(), calls)
+        })
+    });
+    assert!(one.0.len() > 3000, "{} events", one.0.len());
+    assert!(one.0 == two.0, "not the same events");
+    assert_eq!(one.1, two.1);
+    assert!(two.2 != one.2, "two threads were no two cores: {} calls", one.2);
 }

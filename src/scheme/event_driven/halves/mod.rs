@@ -8,6 +8,7 @@
 //! What is rare (an epoch that ends early, a broken invariant) is left to one engine alone, in which both halves are put together again.
 
 mod cut;
+mod log;
 mod sharing;
 mod window;
 
@@ -16,8 +17,8 @@ use std::ops::ControlFlow;
 use impinge_events::calendar::{Buckets, Calendar};
 use impinge_events::{Flight, Surface};
 
+use self::log::{Happened, Log};
 use self::sharing::Sharing;
-use self::window::{Happened, Log};
 use super::collapse::Row;
 use super::{EventDriven, snapshot_of};
 use crate::grains::{Grain, Snapshot};

@@ -5,7 +5,7 @@ use impinge_events::{Flight, Surface};
 
 use super::EventDriven;
 use super::cut::Cut;
-use super::window::{Happened, Log};
+use super::log::{Happened, Log};
 
 /// This part of all grains have copies in the other half at the most: that much more work, and that much longer windows.
 const MOST_COPIES: f64 = 0.3;
