@@ -63,7 +63,7 @@ const SHORTEST: f64 = 0.25;
 /// let law = ContactLaw { restitution: 1.0, friction: Friction::Smooth };
 /// let laws = Laws { grain: law, surface: law, interference: Interference::All, collapse: Collapse::Elastic };
 /// let balls = [ball(0.0, 1.0), ball(3.0, 0.0), ball(9.0, 0.0)];
-/// let mut one = EventDriven::new(&balls, NoSurface, Domain::unbounded(), laws, 0.0);
+/// let mut one: EventDriven<NoSurface> = EventDriven::new(&balls, NoSurface, Domain::unbounded(), laws, 0.0);
 /// let mut two = Halves::of(one.clone());
 /// let go_on = &mut |_| ControlFlow::Continue(());
 /// assert!(one.advance(10.0, &mut (), go_on)?.is_continue() && two.advance(10.0, &mut (), go_on)?.is_continue());
