@@ -83,7 +83,9 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         match &self.neighbors {
             Neighbors::Cells(cells) if !cells.were_there(now) => self.start_anew(now),
             Neighbors::Cells(_) => {
-                for grain in std::mem::take(&mut self.crossed) {
+                // They stay noted: it may go back once more, to an earlier time.
+                for number in 0..self.crossed.len() {
+                    let grain = self.crossed[number];
                     let Neighbors::Cells(cells) = &mut self.neighbors else { return };
                     let flight = self.flights[grain as usize];
                     if is_vacant(&flight) || cells.is_in_place(grain, &flight, now) {
