@@ -17,15 +17,15 @@ use nalgebra::Vector3;
 /// Halvings at the most: a part is no shorter than 1/1024 of the sub-step, and a run in which that does not help ends with its overlap.
 const MOST_HALVINGS: u32 = 10;
 /// The part of what is allowed that contacts at rest may yield, and up to which others may go when they meet. What nobody foresees at a kick has the
-/// rest: grains that are deflected towards each other within the sub-step, and what a surface begins to carry.
+/// rest: grains that are deflected towards each other within the sub-step, or that a surface begins to carry.
 const SHARE: f64 = 0.75;
 /// Pairs that are that deep in each other already may still go this much deeper, over what is allowed: shorter parts would not bring them out.
 const LEAST_SHARE: f64 = 1.0 - SHARE;
 /// Parts become twice as long when this part of what is allowed is used: then four times as much still is a little less.
 const ROOM: f64 = 0.22;
 
-/// Without contacts at rest forces may become so many times as strong from one kick to the next, and a copy is at hand where it will be needed. Where there is
-/// none the bound decides.
+/// A near field may become so many times as strong from one kick to the next, and a copy is at hand where it will be needed. Where there is none the bound
+/// decides.
 const FORESIGHT: f64 = 4.0;
 
 /// The parts of a sub-step, of which each is the sub-step halved some times. One that is not split is its only part.
@@ -128,8 +128,8 @@ fn ticks(halvings: u32) -> u32 {
 pub(super) struct Bound {
     /// Strongest pull on a grain, without what contacts carry, m/s²: chords of contacts may yield in proportion to it.
     pub(super) strongest: f64,
-    /// Largest acceleration of a grain less what all have in common, m/s²: the paths of two grains are nearer than their chords by twice as much times
-    /// h²/8 at the most.
+    /// Largest acceleration of a grain, with gravity and without, m/s²: the paths of two grains are nearer than their chords by twice as much times
+    /// h²/8 at the most. Gravity counts because a surface may begin to carry one of them.
     pub(super) bend: f64,
 }
 
@@ -144,10 +144,10 @@ impl Bound {
         (yielded + 2.0 * self.bend * sag) / penetration
     }
 
-    /// Whether the next part, if it is so long (s), may need a copy to go back to.
-    pub(super) fn is_near(&self, length: f64, radius: f64, penetration: f64) -> bool {
-        let Self { strongest, bend } = self;
-        let stronger = Self { strongest: FORESIGHT * strongest, bend: FORESIGHT * bend };
+    /// Whether the next part, if it is so long (s), may need a copy to go back to. `changes` is whether forces do.
+    pub(super) fn is_near(&self, changes: bool, length: f64, radius: f64, penetration: f64) -> bool {
+        let foresight = if changes { FORESIGHT } else { 1.0 };
+        let stronger = Self { strongest: foresight * self.strongest, bend: foresight * self.bend };
         stronger.depth(length, radius, penetration) > 1.0
     }
 }
@@ -166,10 +166,11 @@ pub(super) struct Bends<'a> {
 }
 
 impl Bends<'_> {
-    /// The largest acceleration of a grain less gravity, m/s².
+    /// The largest acceleration of a grain, with gravity and without, m/s².
     pub(super) fn bend(&self) -> f64 {
         let inside = self.accelerations.iter().zip(self.flights).filter(|(_, flight)| flight.radius > 0.0);
-        inside.map(|(acceleration, _)| (acceleration - self.gravity).norm()).fold(0.0, f64::max)
+        let larger = |acceleration: &Vector3<f64>| acceleration.norm().max((acceleration - self.gravity).norm());
+        inside.map(|(acceleration, _)| larger(acceleration)).fold(0.0, f64::max)
     }
 
     /// How deep grains may go into each other in the next sub-step, over `penetration`, which is over the smaller radius.

@@ -407,9 +407,11 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
     /// Grains that enter within it are not foreseen.
     fn start_part(&mut self) -> Result<(), Broken> {
         let (radius, penetration) = (self.engine.smallest_radius(), self.parts.penetration());
+        let changes = self.forces.near_field.is_some();
         // Contact forces come and go from kick to kick.
         let needs_copy = self.at_rest == AtRest::Carried
-            && (!self.resting.is_empty() || self.bound.is_near(self.parts.longest(self.step), radius, penetration));
+            && (!self.resting.is_empty()
+                || self.bound.is_near(changes, self.parts.longest(self.step), radius, penetration));
         let before = needs_copy.then(|| self.clone());
         self.kick(needs_copy)?;
         let Some(before) = before else { return Ok(()) };
@@ -477,7 +479,7 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
             end.extend_from_slice(accelerations);
             outcome = forces.pull(grains, flights, *strengths, pull);
             let strongest = pull.iter().map(|pull| pull.norm()).fold(0.0, f64::max);
-            *bound = Bound { strongest, bend: 0.0 };
+            *bound = Bound { strongest, bend: strongest };
             let step = parts.next(whole, |step| {
                 accelerations.copy_from_slice(pull);
                 if !carries {
@@ -491,8 +493,7 @@ impl<S: Surface + Clone, C: Calendar + Clone> Substepped<S, C> {
                 }
                 let bends = Bends { flights, accelerations, gravity, ended, step };
                 let pressing = if resting.is_empty() { 0.0 } else { strongest };
-                // What a surface begins to carry is no longer pulled.
-                bound.bend = bends.bend().max(pressing);
+                bound.bend = bends.bend();
                 let surely = if can_go_back { 0.0 } else { bound.depth(step, smallest, penetration) };
                 bends.deepest(vicinity, pressing, penetration).max(surely)
             });
