@@ -12,9 +12,9 @@ const BUCKETS_PER_EVENT: usize = 2;
 const FEWEST_EVENTS: f64 = 0.25;
 const MOST_EVENTS: usize = 4;
 /// So many buckets before theirs it is said who comes; about half as many events come until then.
-const ANNOUNCED: u64 = 24;
+const ANNOUNCED: i64 = 24;
 /// So many buckets before that the first owner in each is fetched from memory.
-const FETCHED: u64 = 8;
+const FETCHED: i64 = 8;
 
 /// A calendar in which an owner is rescheduled in a time that does not grow with the number of owners.
 ///
@@ -29,9 +29,9 @@ pub struct Buckets {
     /// Events of the present bucket and all before it, and some that are no longer so.
     present: BinaryHeap<Entry>,
     /// The present bucket, counted from `origin`.
-    now: u64,
+    now: i64,
     /// The bucket with which the turn began: a multiple of their number.
-    turn: u64,
+    turn: i64,
     /// Start of bucket 0, s.
     origin: f64,
     /// Buckets in a second, 1/s; 0 where they are not laid out.
@@ -43,7 +43,7 @@ pub struct Buckets {
     /// The same since the buckets were laid out, until this turn.
     passed_before: usize,
     /// The bucket up to which it was said who comes.
-    announced: u64,
+    announced: i64,
 }
 
 /// All that belongs to an owner, in one cache line: what the calendar needs of it is then at hand for who asks for its plan.
@@ -85,6 +85,12 @@ impl PartialOrd for Entry {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
+
+    /// What the heap asks most; the times tell nearly always.
+    #[inline]
+    fn le(&self, other: &Self) -> bool {
+        !self.event.is_before(self.owner, &other.event, other.owner)
+    }
 }
 
 impl PartialEq for Entry {
@@ -116,20 +122,20 @@ impl Default for Buckets {
 impl Buckets {
     /// How many buckets are in a turn: a power of two.
     #[inline]
-    fn buckets(&self) -> u64 {
-        self.first.len() as u64 - 1
+    fn buckets(&self) -> i64 {
+        self.first.len() as i64 - 1
     }
 
     /// The bucket of a time.
     #[inline]
-    fn bucket(&self, time: f64) -> u64 {
-        // Saturates: times before the origin are in bucket 0.
-        ((time - self.origin) * self.rate) as u64
+    fn bucket(&self, time: f64) -> i64 {
+        // Saturates. Times before the origin are in negative buckets, all of which are past.
+        ((time - self.origin) * self.rate) as i64
     }
 
     /// The list of a bucket later than the present one.
     #[inline]
-    fn list(&self, bucket: u64) -> usize {
+    fn list(&self, bucket: i64) -> usize {
         let buckets = self.buckets();
         (if bucket - self.turn < buckets { bucket & (buckets - 1) } else { buckets }) as usize
     }
@@ -210,10 +216,10 @@ impl Buckets {
         self.passed_before += self.passed;
         let few = (self.passed as f64) < FEWEST_EVENTS * self.buckets() as f64;
         // To lay out costs as much as that many events, however few there are in a turn.
-        if few && self.passed_before as u64 > self.buckets() {
+        if few && self.passed_before as i64 > self.buckets() {
             return self.lay_out();
         }
-        let mut next = u64::MAX;
+        let mut next = i64::MAX;
         let later = self.first.len() - 1;
         let mut owner = self.first[later];
         while owner != NOBODY {
@@ -318,7 +324,7 @@ impl Calendar for Buckets {
         self.announced = self.announced.max(self.now);
         while self.announced < last {
             self.announced += 1;
-            let list = |bucket: u64| (bucket & (buckets - 1)) as usize;
+            let list = |bucket: i64| (bucket & (buckets - 1)) as usize;
             self.fetch(self.first[list(self.announced + FETCHED)]);
             let mut owner = self.first[list(self.announced)];
             while owner != NOBODY {

@@ -20,7 +20,8 @@ pub struct Plan {
     side_partner: u32,
     /// Until when the surface has been looked at, s, rounded down.
     looked_until: f32,
-    axis: u8,
+    /// Through which side of its cell the owner leaves it.
+    cell_side: u8,
     pair_is_review: bool,
     side_is_exit: bool,
     stopped_by_surface: bool,
@@ -35,7 +36,7 @@ impl Default for Plan {
             pair_partner: NOBODY,
             side_partner: NOBODY,
             looked_until: f32::NEG_INFINITY,
-            axis: 0,
+            cell_side: 0,
             pair_is_review: true,
             side_is_exit: true,
             stopped_by_surface: true,
@@ -81,15 +82,15 @@ impl Plan {
         self.side_is_exit = event.kind == Kind::Exit;
     }
 
-    /// Out of the cell of a grain, along the axis `partner`.
+    /// Out of the cell of a grain, through its side `partner`.
     #[inline]
     pub(crate) fn crossing(&self) -> Event {
-        Event { time: self.crossing_time, kind: Kind::Crossing, partner: u32::from(self.axis) }
+        Event { time: self.crossing_time, kind: Kind::Crossing, partner: u32::from(self.cell_side) }
     }
 
     #[inline]
-    pub(crate) fn set_crossing(&mut self, time: f64, axis: u8) {
-        (self.crossing_time, self.axis) = (time, axis);
+    pub(crate) fn set_crossing(&mut self, time: f64, cell_side: u8) {
+        (self.crossing_time, self.cell_side) = (time, cell_side);
     }
 
     /// Whether the surface stops a grain and has not been looked at until `until` (s).

@@ -59,8 +59,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
 
             let region = |owner: u32| {
                 let first = self.calendar.plan(owner).first();
-                let axis = (first.kind == Kind::Crossing).then_some(first.partner as u8);
-                cells.region_of_next_search(owner, &self.flights[owner as usize], axis)
+                cells.region_of_next_search(owner, (first.kind == Kind::Crossing).then_some(first.partner as u8))
             };
             if let Some(region) = region(self.ahead.before_last(BETWEEN_STAGES)) {
                 cells.fetch_cells(region);

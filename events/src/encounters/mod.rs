@@ -464,7 +464,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     fn plan_crossing(&mut self, grain: u32) {
         if let Neighbors::Cells(cells) = &self.neighbors {
             let crossing = cells.crossing(grain, &self.flights[grain as usize]);
-            self.calendar.plan_mut(grain).set_crossing(crossing.time, crossing.axis);
+            self.calendar.plan_mut(grain).set_crossing(crossing.time, crossing.side);
         } else {
             self.calendar.plan_mut(grain).set_crossing(f64::INFINITY, 0);
         }
@@ -561,12 +561,12 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             return self.think_over_cells(now);
         }
         let plan = self.calendar.plan(grain);
-        let (axis, mut best) = (plan.crossing().partner as u8, plan.pair());
+        let (side, mut best) = (plan.crossing().partner as u8, plan.pair());
         if let Neighbors::Cells(cells) = &mut self.neighbors {
-            let step = cells.cross(grain, &self.flights[grain as usize], axis);
+            cells.cross(grain, side);
             let mut near = std::mem::take(&mut self.near);
             near.clear();
-            cells.add_ahead(grain, axis, step, &mut near);
+            cells.add_ahead(grain, side, &mut near);
             if near.len() > 0 {
                 best = self.search(grain).first_among(&mut near);
             }

@@ -35,9 +35,11 @@ impl<C: Calendar> Search<'_, C> {
         if !near.here.len().is_multiple_of(2) {
             near.here.push(self.grain);
         }
+        // Of these the compiler knows that they stay as they are.
+        let (ours, flights) = (self.flight, self.flights);
         for two in near.here.as_chunks::<2>().0 {
-            let flights = two.map(|other| &self.flights[other as usize]);
-            let mut in_reach = spheres_may_touch_two(&self.flight, flights, self.until);
+            let theirs = two.map(|other| &flights[other as usize]);
+            let mut in_reach = spheres_may_touch_two(&ours, theirs, self.until);
             while in_reach != 0 {
                 self.consider(two[in_reach.trailing_zeros() as usize], Vector3::zeros());
                 in_reach &= in_reach - 1;

@@ -40,7 +40,9 @@ pub(super) struct Layout {
     /// Velocity of that corner, m/s.
     pub(super) drift: Vector3<f64>,
     /// By which part of its size at `born` a cell grows in a second, 1/s; never negative.
-    pub(super) growth: Vector3<f64>,
+    growth: Vector3<f64>,
+    /// By how much (m/s) each side of the cells moves faster than the one below it: as much as a cell grows.
+    pub(super) rise: Vector3<f64>,
     /// When the cells were laid out, s (epoch time).
     pub(super) born: f64,
 }
@@ -111,6 +113,7 @@ impl Layout {
             corner,
             drift,
             growth,
+            rise: size.component_mul(&growth),
             born: now,
         }
     }
@@ -131,12 +134,6 @@ impl Layout {
     #[inline]
     pub(super) fn scale(&self, time: f64) -> Vector3<f64> {
         (self.growth * (time - self.born)).add_scalar(1.0)
-    }
-
-    /// Velocity of side `number` of the cells along `axis`, m/s.
-    #[inline]
-    pub(super) fn side_velocity(&self, axis: usize, number: i32) -> f64 {
-        self.drift[axis] + f64::from(number) * self.size[axis] * self.growth[axis]
     }
 
     /// How many cells `flights` cross in a second, as they are at `now` (s, epoch time).

@@ -11,6 +11,7 @@ mod layout;
 mod slots;
 
 use nalgebra::Vector3;
+use wide::f64x4;
 
 use self::layout::{FEWEST_PERIODIC_CELLS, Layout, contact_width};
 use self::slots::Slots;
@@ -51,7 +52,7 @@ struct Link {
 pub(crate) struct Near {
     /// Those that are where their stored positions say.
     pub(crate) here: Vec<u32>,
-    /// Those whose periodic images are near, and the shift (m) that brings them there. Others may be among them, with a shift of zero.
+    /// Those whose periodic images are near, and the shift (m) that brings them there.
     pub(crate) beyond: Vec<(u32, Vector3<f64>)>,
 }
 
@@ -101,20 +102,26 @@ const NOWHERE: Place = Place { cell: Vector3::new(0, 0, 0), edges: INSIDE };
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Crossing {
     pub(crate) time: f64,
-    /// 0, 1 or 2.
-    pub(crate) axis: u8,
+    /// Through which side of the cell: twice the axis, and one more for the upper side.
+    pub(crate) side: u8,
 }
 
-/// The bits of the nine cells that lie ahead of a step along each axis, down and up.
-const AHEAD: [[u32; 2]; 3] = {
-    let mut ahead = [[0; 2]; 3];
+/// The axis to which a side is normal, and the step along it that leads through the side.
+#[inline]
+fn axis_and_step(side: u8) -> (usize, i32) {
+    (usize::from(side / 2), 2 * i32::from(side % 2) - 1)
+}
+
+/// The bits of the nine cells that lie ahead of a step through each side of a cell.
+const AHEAD: [u32; 6] = {
+    let mut ahead = [0; 6];
     let mut number = 0;
     while number < 27 {
         let mut axis = 0;
         while axis < 3 {
             let step = steps(number)[axis];
             if step != 0 {
-                ahead[axis][(step > 0) as usize] |= 1 << number;
+                ahead[2 * axis + (step > 0) as usize] |= 1 << number;
             }
             axis += 1;
         }
@@ -170,7 +177,7 @@ impl Cells {
     fn empty(domain: Domain, layout: Layout, grains: usize, everywhere: usize) -> Self {
         let offsets = Box::new(std::array::from_fn(|edges| Self::offsets(&layout, edges)));
         // In a planar scene nobody is beside the plane.
-        let beside = if domain.planar { AHEAD[1][0] | AHEAD[1][1] } else { 0 };
+        let beside = if domain.planar { AHEAD[2] | AHEAD[3] } else { 0 };
         let around = ((1 << 27) - 1) & !beside;
         let slots = Slots::new(layout.cells(), grains, NOBODY);
         let (links, places) = (Vec::new(), Vec::new());
@@ -312,51 +319,46 @@ impl Cells {
     /// When and through which side `flight` leaves its cell.
     #[inline]
     pub(crate) fn crossing(&self, id: u32, flight: &Flight) -> Crossing {
-        let cell = self.places[id as usize].cell;
-        let y = self.relative(flight.position, flight.time);
-        let size = self.layout.size.component_mul(&self.layout.scale(flight.time));
-        let mut first = Crossing { time: f64::INFINITY, axis: 0 };
+        let three = |vector: &Vector3<f64>| f64x4::from([vector.x, vector.y, vector.z, 0.0]);
+        let (never, none) = (f64x4::splat(f64::INFINITY), f64x4::ZERO);
+        let number = three(&self.places[id as usize].cell.map(f64::from));
+        let Layout { corner, drift, rise, size, born, .. } = &self.layout;
+        let [corner, drift, rise, size] = [corner, drift, rise, size].map(three);
+        let size = size + rise * (flight.time - born);
+        // Place and velocity as the lower side of the cell sees them.
+        let place = three(&flight.position) - (corner + drift * flight.time) - number * size;
+        let speed = three(&flight.velocity) - (drift + number * rise);
+        // It leaves through the upper side, or else the lower, or never.
+        let faster = speed - rise;
+        let up = faster.simd_gt(none);
+        let room = up.bitselect(size - place, place);
+        let time = (speed.simd_lt(none) | up).bitselect(room / up.bitselect(faster, -speed), never);
+        let ups = up.to_bitmask();
+        let times = time.to_array();
+        let mut first = Crossing { time: f64::INFINITY, side: 0 };
         for axis in 0..3 {
-            let Some((step, speed)) = self.way_out(cell, flight, axis) else { continue };
-            let side = f64::from(cell[axis] + i32::from(step > 0)) * size[axis];
-            let time = flight.time + (side - y[axis]) / speed;
-            if time < first.time {
-                first = Crossing { time, axis: axis as u8 };
+            if times[axis] < first.time {
+                first = Crossing { time: times[axis], side: 2 * axis as u8 + (ups >> axis & 1) as u8 };
             }
         }
+        first.time += flight.time;
         first
     }
 
-    /// Through which side along `axis` (1 or -1) a flight leaves its cell, and how fast (m/s) it approaches that side; `None` where it never
-    /// does.
+    /// Moves grain `id` through a side of its cell into the next.
     #[inline]
-    fn way_out(&self, cell: Vector3<i32>, flight: &Flight, axis: usize) -> Option<(i32, f64)> {
-        let v = flight.velocity[axis];
-        let to_upper = v - self.layout.side_velocity(axis, cell[axis] + 1);
-        if to_upper > 0.0 {
-            return Some((1, to_upper));
-        }
-        let to_lower = v - self.layout.side_velocity(axis, cell[axis]);
-        (to_lower < 0.0).then_some((-1, to_lower))
-    }
-
-    /// Moves grain `id` into the next cell along `axis` and tells which way it went.
-    #[inline]
-    pub(crate) fn cross(&mut self, id: u32, flight: &Flight, axis: u8) -> i32 {
-        let axis = usize::from(axis);
-        let step = self.way_out(self.places[id as usize].cell, flight, axis).map_or(1, |(step, _)| step);
+    pub(crate) fn cross(&mut self, id: u32, side: u8) {
+        let (axis, step) = axis_and_step(side);
         self.remove(id);
         let mut cell = self.places[id as usize].cell;
         cell[axis] += step;
         self.link(id, cell);
-        step
     }
 
-    /// Adds to `near` every grain in the cells that have become adjacent to grain `id` by its last `step` along `axis`.
+    /// Adds to `near` every grain in the cells that have become adjacent to grain `id` when it went through a `side` of its cell.
     #[inline]
-    pub(crate) fn add_ahead(&self, id: u32, axis: u8, step: i32, near: &mut Near) {
-        let ahead = AHEAD[usize::from(axis)][usize::from(step > 0)];
-        self.add(self.places[id as usize], self.links[id as usize], ahead & self.around, near);
+    pub(crate) fn add_ahead(&self, id: u32, side: u8, near: &mut Near) {
+        self.add(self.places[id as usize], self.links[id as usize], AHEAD[usize::from(side)] & self.around, near);
     }
 
     /// Adds to `near` every grain in the cells around grain `id`, itself included.
@@ -378,16 +380,16 @@ impl Cells {
         prefetch(&self.links, id as usize);
     }
 
-    /// Where the next search for grain `id` will look: ahead, if it then crosses the side of its cell along `axis`, or else all around; nowhere if it has
+    /// Where the next search for grain `id` will look: ahead, if it then goes through a `side` of its cell, or else all around; nowhere if it has
     /// no place. At the ends of a period that may be wrong: it serves to fetch from memory.
     #[inline]
-    pub(crate) fn region_of_next_search(&self, id: u32, flight: &Flight, axis: Option<u8>) -> Option<Region> {
+    pub(crate) fn region_of_next_search(&self, id: u32, side: Option<u8>) -> Option<Region> {
         // Since it was said to come it may have been taken out, and cells laid out that never saw it.
-        let Place { cell, edges } = *self.places.get(id as usize)?;
+        let edges = self.places.get(id as usize)?.edges;
         let number = self.links.get(id as usize)?.number;
-        let Some(axis) = axis.map(usize::from) else { return Some(Region { number, edges, wanted: self.around }) };
-        let step = self.way_out(cell, flight, axis).map_or(1, |(step, _)| step);
-        let wanted = AHEAD[axis][usize::from(step > 0)] & self.around;
+        let Some(side) = side else { return Some(Region { number, edges, wanted: self.around }) };
+        let (axis, step) = axis_and_step(side);
+        let wanted = AHEAD[usize::from(side)] & self.around;
         Some(Region { number: number.wrapping_add(self.layout.along(axis, step)), edges, wanted })
     }
 
@@ -445,8 +447,10 @@ impl Cells {
                 if theirs.number == number {
                     if is_here && theirs.next & TURNED == 0 {
                         near.here.push(other);
+                    } else if let Some(shift) = self.shift(other, place.cell, around) {
+                        near.beyond.push((other, shift));
                     } else {
-                        near.beyond.push((other, self.shift(other, place.cell, around)));
+                        near.here.push(other);
                     }
                 }
                 other = theirs.next & !TURNED;
@@ -454,11 +458,14 @@ impl Cells {
         }
     }
 
-    /// The shift (m) that brings `grain` to where its image is in the cell with this number around `centre`.
+    /// The shift (m) that brings `grain` to where its image is in the cell with this number around `centre`; nothing where it is there itself.
     #[inline(never)]
-    fn shift(&self, grain: u32, centre: Vector3<i32>, around: usize) -> Vector3<f64> {
+    fn shift(&self, grain: u32, centre: Vector3<i32>, around: usize) -> Option<Vector3<f64>> {
         let Layout { period, extent, .. } = &self.layout;
         let apart = centre + Vector3::from(steps(around)) - self.places[grain as usize].cell;
-        Vector3::from_fn(|axis, _| f64::from(apart[axis] / period[axis].max(1)) * extent[axis])
+        if apart == Vector3::zeros() {
+            return None;
+        }
+        Some(Vector3::from_fn(|axis, _| f64::from(apart[axis] / period[axis].max(1)) * extent[axis]))
     }
 }
