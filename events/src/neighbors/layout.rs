@@ -136,6 +136,12 @@ impl Layout {
         (self.growth * (time - self.born)).add_scalar(1.0)
     }
 
+    /// Extent of a cell along `axes` at `time` (s, epoch time): m³, or m² in a planar scene.
+    pub(super) fn volume(&self, axes: &[usize], time: f64) -> f64 {
+        let size = self.size.component_mul(&self.scale(time));
+        axes.iter().map(|&axis| size[axis]).product()
+    }
+
     /// How many cells `flights` cross in a second, as they are at `now` (s, epoch time).
     pub(super) fn crossing_rate(&self, flights: &[Flight], now: f64) -> f64 {
         let scale = self.scale(now);

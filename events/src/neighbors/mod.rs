@@ -186,8 +186,8 @@ impl Cells {
 
     /// An empty grid that suits `flights` better, if it is worth its cost; `crossings` and `looks` are what this one took lately.
     ///
-    /// Cells x times as wide are crossed 1/x times as often and hold x³ times as many grains to look at. The sum of both costs is
-    /// least where x⁴ = cost of the crossings / (3 cost of the looks); in a planar scene x³ with 2.
+    /// Cells x times as wide as they have become by now are crossed 1/x times as often and hold x³ times as many grains to look at. The sum of both
+    /// costs is least where x⁴ = cost of the crossings / (3 cost of the looks); in a planar scene x³ with 2.
     pub(crate) fn better(
         &self,
         largest_radius: f64,
@@ -196,13 +196,14 @@ impl Cells {
         crossings: usize,
         looks: usize,
     ) -> Option<Self> {
-        let dimensions = self.domain.axes().len() as f64;
+        let axes = self.domain.axes();
+        let dimensions = axes.len() as f64;
         let (crossing, looking) = (LOOKS_PER_CROSSING * crossings as f64, looks.max(1) as f64);
         let wider = (crossing / (dimensions * looking)).powf(1.0 / (dimensions + 1.0)).clamp(0.5, 2.0);
-        let width = self.layout.size.x * wider;
+        let width = self.layout.volume(axes, now).powf(1.0 / dimensions) * wider;
         let layout = Layout::new(&self.domain, largest_radius, Some(width), self.everywhere, flights, now);
         let fewer = layout.crossing_rate(flights, now) / self.layout.crossing_rate(flights, now);
-        let more = (layout.size.x / self.layout.size.x).powf(dimensions);
+        let more = layout.volume(axes, now) / self.layout.volume(axes, now);
         let worth_it = fewer * crossing + more * looking < WORTH_A_NEW_LAYOUT * (crossing + looking);
         worth_it.then(|| Self::empty(self.domain, layout, flights.len(), self.everywhere))
     }
@@ -467,5 +468,27 @@ impl Cells {
             return None;
         }
         Some(Vector3::from_fn(|axis, _| f64::from(apart[axis] / period[axis].max(1)) * extent[axis]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Cells that had grown with a spray were taken for as narrow as they were laid out: however many looks they cost, they stayed.
+    #[test]
+    fn cells_that_have_grown_are_as_wide_as_they_are() {
+        let flights: Vec<Flight> = (0..1000)
+            .map(|number| {
+                let place = Vector3::new(number % 10, number / 10 % 10, number / 100).map(|x| f64::from(x) - 4.5);
+                let velocity = place.add_scalar(f64::from(number % 7) * 0.01);
+                Flight { position: place, time: 0.0, velocity, radius: 0.4 }
+            })
+            .collect();
+        let cells = Cells::new(Domain::unbounded(), 0.4, 0, &flights, 0.0);
+        let width = |cells: &Cells| cells.layout.volume(&[0, 1, 2], 3.0).cbrt();
+        let (crossings, looks) = (1, 1_000_000);
+        let better = cells.better(0.4, &flights, 3.0, crossings, looks).expect("looks cost more than all else");
+        assert!(width(&cells) > 3.0 && width(&better) < 0.51 * width(&cells), "{} {}", width(&cells), width(&better));
     }
 }
