@@ -195,12 +195,15 @@ fn crossing([a, b, c]: [Vector3<f64>; 3], point: &Vector3<f64>, direction: &Vect
 /// never, at infinity, when it misses it.
 #[inline]
 fn passage(bounds: &Aabb<f64, 3>, margin: f64, point: &Vector3<f64>, inverse: &Vector3<f64>) -> (f64, f64) {
+    // One instruction each, unlike those that look for NaN (a flight along a side of the box): where the first is none, the second stands.
+    let lesser = |a: f64, b: f64| if a < b { a } else { b };
+    let greater = |a: f64, b: f64| if a > b { a } else { b };
     let (mut enter, mut leave) = (0.0f64, f64::INFINITY);
     for axis in 0..3 {
         let low = (bounds.min[axis] - margin - point[axis]) * inverse[axis];
         let high = (bounds.max[axis] + margin - point[axis]) * inverse[axis];
-        enter = enter.max(low.min(high));
-        leave = leave.min(low.max(high));
+        enter = greater(lesser(low, high), enter);
+        leave = lesser(greater(low, high), leave);
     }
     if enter <= leave { (enter, leave) } else { (f64::INFINITY, leave) }
 }
@@ -211,8 +214,6 @@ struct Search<'a> {
     sweep: &'a Sweep,
     /// One over the velocity, component by component.
     inverse: Vector3<f64>,
-    /// Time in which the centre moves by one metre, in the units of the sweep.
-    slowness: f64,
     /// The radius and what rounding may hide, m.
     margin: f64,
     /// The first contact so far, or the end of the search, s.
@@ -227,8 +228,7 @@ impl<'a> Search<'a> {
     fn new(index: &'a Index, sweep: &'a Sweep, until: f64) -> Self {
         let margin = sweep.radius + BOX_SLACK * (sweep.radius + sweep.position.amax());
         let inverse = sweep.velocity.map(|component| 1.0 / component);
-        let slowness = 1.0 / sweep.velocity.norm();
-        Self { index, sweep, inverse, slowness, margin, time: until, element: None, end: None }
+        Self { index, sweep, inverse, margin, time: until, element: None, end: None }
     }
 
     #[inline]
@@ -236,18 +236,21 @@ impl<'a> Search<'a> {
         passage(bounds, self.margin, &self.sweep.position, &self.inverse)
     }
 
-    /// Before this interval the sphere does not touch the box; infinity when it never does.
+    /// Before this interval the sphere does not touch the box; infinity when it does not up to the first contact so far.
     ///
     /// When the centre enters the widened box, the sphere may still be away from a corner or a side of the box itself, and
     /// comes nearer by no more than it moves.
     #[inline]
     fn earliest(&self, bounds: &Aabb<f64, 3>) -> f64 {
         let (enter, leave) = self.passage(bounds);
-        if enter == f64::INFINITY {
+        if enter == f64::INFINITY || self.sweep.time(enter) > self.time {
+            return f64::INFINITY;
+        }
+        let away = from_box(bounds, &(self.sweep.position + self.sweep.velocity * enter)).norm_squared();
+        if away <= self.margin * self.margin {
             return enter;
         }
-        let away = from_box(bounds, &(self.sweep.position + self.sweep.velocity * enter)).norm() - self.margin;
-        let earliest = enter + away.max(0.0) * self.slowness;
+        let earliest = enter + (away.sqrt() - self.margin) / self.sweep.velocity.norm();
         if earliest <= leave { earliest } else { f64::INFINITY }
     }
 
