@@ -335,11 +335,10 @@ impl Cells {
         let room = up.bitselect(size - place, place);
         let time = (speed.simd_lt(none) | up).bitselect(room / up.bitselect(faster, -speed), never);
         let ups = up.to_bitmask();
-        let times = time.to_array();
         let mut first = Crossing { time: f64::INFINITY, side: 0 };
-        for axis in 0..3 {
-            if times[axis] < first.time {
-                first = Crossing { time: times[axis], side: 2 * axis as u8 + (ups >> axis & 1) as u8 };
+        for (axis, time) in (0..3).zip(time.to_array()) {
+            if time < first.time {
+                first = Crossing { time, side: 2 * axis + (ups >> axis & 1) as u8 };
             }
         }
         first.time += flight.time;
