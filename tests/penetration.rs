@@ -209,6 +209,36 @@ fn a_grain_that_meets_one_that_has_just_come_to_rest_keeps_to_the_tolerance() {
     }
 }
 
+/// Grains that enter within a part of a sub-step, and meet others before it ends, are unknown to whoever looked ahead.
+#[test]
+fn grains_that_enter_just_above_a_pile_keep_to_the_tolerance() {
+    for step in [4e-4, 2e-4] {
+        let scene = falling(100, 1, rough(0.3, 0.4));
+        let mut run = scene.start(Length::Fixed(step));
+        let mut observers = (Log::default(), Ledger::default());
+        let (mut time, mut worst) = (0.3, 0_f64);
+        advance(&mut run, time, &mut observers);
+        let (mut entered, mut random) = (0, rand_pcg::Pcg64::seed_from_u64(2));
+        while entered < 60 {
+            time += step / LOOKS;
+            advance(&mut run, time, &mut observers);
+            worst = worst.max(deepest(&scene, &run, time));
+            // A hair above one of the grains, so that it meets it within a quarter of a sub-step.
+            let states = states(&run, time);
+            let below = states[random.random_range(0..states.len())].0.position;
+            let speed = random.random_range(0.5..5.0);
+            let place = below + Vector3::z() * (2.0 * RADIUS + 0.25 * speed * step);
+            if run.engine().is_free(place, RADIUS, time) {
+                run.enter(time, &ball(place, Vector3::z() * -speed, RADIUS, DENSITY), &mut observers);
+                entered += 1;
+            }
+        }
+        let deepest = worst.max(observers.1.max_overlap_over_radius());
+        eprintln!("entering, sub-step {step}: {deepest:.2e} radii, {:?}", run.report().expect("finite forces"));
+        assert!(deepest <= DEFAULT_PENETRATION, "sub-step {step}: {deepest:e}");
+    }
+}
+
 /// Without a sub-step in the scene it is chosen so that its error stays small; that alone does not keep grains apart.
 #[test]
 fn chosen_sub_steps_keep_to_the_tolerance() {
