@@ -70,7 +70,7 @@ impl Lists {
                     let theirs = &flights[other as usize];
                     let reach = flight.radius + theirs.radius + skin;
                     let apart = theirs.position + shift - flight.position;
-                    other != grain as u32 && apart.norm_squared() < reach * reach
+                    apart.norm_squared() < reach * reach
                 }));
             }
             lists.starts.push(lists.others.len() as u32);

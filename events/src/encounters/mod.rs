@@ -56,7 +56,7 @@ enum Neighbors {
 }
 
 impl Neighbors {
-    /// Adds every grain that can soon touch `grain`, and perhaps itself, to `near`.
+    /// Adds every grain that can soon touch `grain` to `near`, which is empty.
     #[inline]
     fn add(&self, grain: u32, near: &mut Near) {
         match self {
@@ -503,7 +503,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         near.clear();
         self.neighbors.add(grain, &mut near);
         self.looks += near.len();
-        let best = self.search(grain).first_among(&mut near);
+        let best = self.search(grain).first_among(&near);
         self.near = near;
         self.plan_pair(grain, best);
     }
@@ -568,7 +568,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             near.clear();
             cells.add_ahead(grain, side, &mut near);
             if near.len() > 0 {
-                best = self.search(grain).first_among(&mut near);
+                best = self.search(grain).first_among(&near);
             }
             self.near = near;
         }

@@ -10,6 +10,9 @@ use crate::neighbors::Near;
 /// By this part of the smaller radius grains that touch under force may overlap before they meet again ([`sphere_sphere_yielding`]).
 pub const YIELDING: f64 = 1e-6;
 
+/// So many twos are looked at before going on with any: a bit each of 64.
+const PART: usize = 32;
+
 /// A search for the first grain that `grain` meets.
 pub(super) struct Search<'a, C> {
     pub(super) grain: u32,
@@ -29,24 +32,32 @@ pub(super) struct Search<'a, C> {
 impl<C: Calendar> Search<'_, C> {
     /// The first meeting with one of `near` that comes before all that either of the two has planned, or else what this grain has planned.
     ///
-    /// Most of `near` are out of reach. To find out about two of them at once before going on with either is the fastest way.
+    /// Most of `near` are out of reach. To find out about two of them at once, and about all before going on with any, is the fastest way: which are in
+    /// reach cannot be foretold, and a wrong guess costs a processor as much as a look.
     #[inline]
-    pub(super) fn first_among(mut self, near: &mut Near) -> Event {
-        if !near.here.len().is_multiple_of(2) {
-            near.here.push(self.grain);
-        }
+    pub(super) fn first_among(mut self, near: &Near) -> Event {
         // Of these the compiler knows that they stay as they are.
         let (ours, flights) = (self.flight, self.flights);
-        for two in near.here.as_chunks::<2>().0 {
-            let theirs = two.map(|other| &flights[other as usize]);
-            let mut in_reach = spheres_may_touch_two(&ours, theirs, self.until);
+        let (here, mut left) = near.here();
+        for part in here.chunks(PART) {
+            let mut in_reach = 0;
+            for (number, two) in part.iter().enumerate() {
+                let theirs = two.map(|other| &flights[other as usize]);
+                in_reach |= u64::from(spheres_may_touch_two(&ours, theirs, self.until)) << (2 * number);
+            }
+            if left < 2 * part.len() {
+                // The last one has nobody beside it.
+                in_reach &= !(1 << left);
+            }
+            left = left.saturating_sub(2 * PART);
             while in_reach != 0 {
-                self.consider(two[in_reach.trailing_zeros() as usize], Vector3::zeros());
+                let number = in_reach.trailing_zeros() as usize;
+                self.consider(part[number / 2][number % 2], Vector3::zeros());
                 in_reach &= in_reach - 1;
             }
         }
         for &(other, shift) in &near.beyond {
-            if spheres_may_touch(&self.flight, &self.flights[other as usize], shift, self.until) {
+            if spheres_may_touch(&ours, &flights[other as usize], shift, self.until) {
                 self.consider(other, shift);
             }
         }
@@ -58,9 +69,6 @@ impl<C: Calendar> Search<'_, C> {
     /// What `other` has planned earlier will deflect it, and then it looks for itself; so does whoever it leaves.
     #[inline(never)]
     fn consider(&mut self, other: u32, shift: Vector3<f64>) {
-        if other == self.grain {
-            return;
-        }
         let theirs = &self.flights[other as usize];
         let met = if let Some(sag) = self.sag {
             let slack = YIELDING * self.flight.radius.min(theirs.radius) + sag;

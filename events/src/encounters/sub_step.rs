@@ -78,7 +78,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         let place = ours.position_at(time);
         let mut near = Near::default();
         self.neighbors.add(grain, &mut near);
-        for (other, shift) in near.iter().filter(|&(other, _)| other != grain) {
+        for (other, shift) in near.iter() {
             let theirs = self.flight(other);
             let apart = theirs.position_at(time) + shift - place;
             let within = ours.radius + theirs.radius + reach;
