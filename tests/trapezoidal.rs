@@ -410,3 +410,35 @@ fn a_periodic_gas_keeps_its_momentum() {
     assert!(outcome.states.iter().all(|(flight, _)| flight.position.amax() <= 0.6));
     assert!(outcome.log.largest_miss() < 0.05, "{}", outcome.log.largest_miss());
 }
+
+/// Between two iterates only grains in contact move, and only at them the scheme looks again: it sees what a look at all would.
+#[test]
+fn a_look_at_those_that_moved_sees_what_a_look_at_all_sees() {
+    const AFTER: f64 = 0.01;
+    const REACH: f64 = 0.05;
+    let mut random = rand_pcg::Pcg64::seed_from_u64(5);
+    let mut within = |most: f64| Vector3::from_fn(|_, _| random.random_range(-most..most));
+    let place = |at: Vector3<f64>| Vector3::new(at.x, at.y, at.z.abs() + 0.3);
+    let grains: Vec<NewGrain> = (0..200).map(|_| grain(place(within(6.0)), within(1.0), 0.5, 1.0)).collect();
+    for target in [floor(), mesh_floor(20.0)] {
+        let surface = Surface::new(&[target], ".".as_ref()).expect("a surface");
+        let forces = Forces { gravity: Vector3::zeros(), near_field: None, contact_time: 0.0 };
+        let mut crowd = Crowd::new(&grains, surface, Domain::unbounded(), smooth(1.0, 1.0), forces, 0.0);
+        crowd.look(AFTER, REACH);
+        let mut changes = [0; 2];
+        for round in 0..60 {
+            let moved: Vec<u32> = (0..9).map(|k| (7 * round + 31 * k) % 200).collect();
+            for &slot in &moved {
+                crowd.flights[slot as usize].position += within(0.3);
+            }
+            let before = (crowd.pairs().to_vec(), crowd.at_surface().to_vec());
+            let mut all = crowd.clone();
+            all.look(AFTER, REACH);
+            crowd.look_again(&moved, AFTER, REACH);
+            assert_eq!((crowd.pairs(), crowd.at_surface()), (all.pairs(), all.at_surface()), "round {round}");
+            changes[0] += u32::from(crowd.pairs() != before.0);
+            changes[1] += u32::from(crowd.at_surface() != before.1);
+        }
+        assert!(changes.iter().all(|&changes| changes > 5), "the test sees nothing change: {changes:?}");
+    }
+}

@@ -101,3 +101,33 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::{Domain, Encounter, NoSurface};
+
+    fn ball(x: f64, y: f64, speed: f64) -> Flight {
+        Flight { position: Vector3::new(x, y, 0.0), time: 0.0, velocity: Vector3::x() * speed, radius: 0.5 }
+    }
+
+    /// A window that goes back twice: who had crossed cells was forgotten after the first time, and stood where it flies later.
+    #[test]
+    fn going_back_twice_puts_all_where_they_are() {
+        let mut flights: Vec<Flight> = (0..8).map(|number| ball(3.0 * f64::from(number), -9.0, 0.0)).collect();
+        flights.extend([ball(0.0, 0.0, 2.0), ball(4.0, 6.0, 0.0)]);
+        let count = flights.len();
+        let mut balls = Encounters::<NoSurface>::new(flights, NoSurface, Domain::unbounded());
+        balls.keep_only(|_| true, count, 0.0);
+        balls.forget_crossings();
+        assert_eq!(balls.next_before(9.0), None);
+        assert!(balls.crossed.contains(&8));
+        balls.turn_back(6.0);
+        balls.lift(9);
+        balls.put_down(9, Flight { time: 1.0, ..ball(6.0, 0.0, 0.0) }, true, 1.0);
+        balls.turn_back(1.0);
+        assert_eq!(balls.next_before(9.0), Some((2.5, Encounter::Grains { a: 8, b: 9 })));
+    }
+}

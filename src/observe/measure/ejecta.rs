@@ -173,11 +173,13 @@ fn median_angle(left: &[Left]) -> f64 {
     reached.map_or(f64::NAN, |grain| grain.angle.to_degrees())
 }
 
+/// What rounding may take off a sum of equal masses, relative: it must not take one grain more to half of them.
+const ROUNDING: f64 = 1e-12;
+
 /// The two angles (degrees), as near to each other as can be, between which half of the mass leaves.
 fn half_mass_range(left: &[Left]) -> [f64; 2] {
     let sorted = sorted(left);
-    // What rounding leaves of equal masses must not take one grain more.
-    let half = 0.5 * mass(left) * (1.0 - 1e-12);
+    let half = 0.5 * mass(left) * (1.0 - ROUNDING);
     let mut best = [f64::NEG_INFINITY, f64::INFINITY];
     let (mut first, mut between) = (0, 0.0);
     for last in &sorted {

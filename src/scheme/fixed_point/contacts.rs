@@ -39,8 +39,7 @@ impl Contacts {
     }
 
     fn between_grains(&mut self, crowd: &mut Crowd, observer: &mut impl Observer) {
-        self.touching.clear();
-        self.touching.extend(crowd.pairs().iter().filter_map(|&pair| Some((pair, crowd.near(pair, 0.0)?))));
+        crowd.touching(&mut self.touching);
         for (pair, near) in &self.touching {
             let before = pair.map(|slot| crowd.body(slot));
             let contact = resolve_pair(&crowd.laws().grain, &before[0], &before[1], near.normal);

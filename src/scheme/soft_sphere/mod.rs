@@ -27,7 +27,7 @@ use nalgebra::Vector3;
 
 use self::contacts::{Contact, Contacts};
 pub use self::hertz::{Hertz, effective_modulus};
-use super::stepped::{Crowd, GONE, Method, even, retain};
+use super::stepped::{Crowd, GONE, Method, Near, even, retain};
 use super::{Broken, Observer};
 use crate::law::{Friction, friction};
 use crate::scene;
@@ -54,6 +54,8 @@ pub struct SoftSphere {
     next_pull: Vec<Vector3<f64>>,
     pairs: Contacts,
     hits: Contacts,
+    /// Pairs that touch.
+    touching: Vec<([u32; 2], Near)>,
     /// Contacts of one grain with the surface.
     found: Vec<(u32, SurfaceContact)>,
 }
@@ -74,6 +76,7 @@ impl SoftSphere {
             next_pull: Vec::new(),
             pairs: Contacts::default(),
             hits: Contacts::default(),
+            touching: Vec::new(),
             found: Vec::new(),
         };
         scheme.shorten(crowd, 0);
@@ -118,9 +121,9 @@ impl SoftSphere {
 
     /// Pushes apart the pairs that touch.
     fn press_pairs(&mut self, crowd: &mut Crowd) {
-        for k in 0..crowd.pairs().len() {
-            let pair = crowd.pairs()[k];
-            let Some(near) = crowd.near(pair, 0.0) else { continue };
+        crowd.touching(&mut self.touching);
+        for k in 0..self.touching.len() {
+            let (pair, near) = self.touching[k];
             let contact = match self.pairs.of_pair(pair) {
                 Some(open) => open,
                 None if crowd.shields(pair) => continue,

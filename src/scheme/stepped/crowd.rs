@@ -166,40 +166,69 @@ impl Crowd {
     /// [`at_surface`](Self::at_surface) name all that are nearer to each other than `reach` (m). Cheap as long as lists hold.
     pub fn look(&mut self, after: f64, reach: f64) {
         self.look_for_grains(self.clock + after, after, reach);
-        self.look_for_surface(self.clock + after, after, reach);
+        self.look_for_surface(after, reach);
     }
 
     /// The same at the beginning of a step that may be as long as `step` (s), with a reach (m) of its own for the surface.
     pub fn look_ahead(&mut self, step: f64, reach: f64, surface_reach: f64) {
         self.look_for_grains(self.clock, step, reach);
-        self.look_for_surface(self.clock, 0.0, surface_reach);
+        self.look_for_surface(0.0, surface_reach);
+    }
+
+    /// As [`look`](Self::look), where since the last look of the step, with the same reach, only the grains in `slots` have moved.
+    pub fn look_again(&mut self, slots: &[u32], after: f64, reach: f64) {
+        let now = self.clock + after;
+        let holds = |slot: &u32| {
+            let slot = *slot as usize..*slot as usize + 1;
+            self.neighbours.holds(&self.flights, slot, &self.domain, now, reach)
+        };
+        if self.laws.interference != Interference::None && !slots.iter().all(holds) {
+            self.neighbours.make(&self.flights, &self.domain, now, reach, after);
+        }
+        for &slot in slots {
+            let place = self.at_surface.binary_search(&slot);
+            match (self.is_near_surface(slot as usize, after, reach), place) {
+                (true, Err(place)) => self.at_surface.insert(place, slot),
+                (false, Ok(place)) => drop(self.at_surface.remove(place)),
+                _ => {}
+            }
+        }
     }
 
     fn look_for_grains(&mut self, now: f64, step: f64, reach: f64) {
         let Self { flights, neighbours, domain, .. } = self;
-        if self.laws.interference != Interference::None && !neighbours.holds(flights, domain, now, reach) {
+        if self.laws.interference != Interference::None
+            && !neighbours.holds(flights, 0..flights.len(), domain, now, reach)
+        {
             neighbours.make(flights, domain, now, reach, step);
         }
     }
 
-    fn look_for_surface(&mut self, now: f64, after: f64, reach: f64) {
+    fn look_for_surface(&mut self, after: f64, reach: f64) {
         self.at_surface.clear();
         if self.surface.elements() == 0 {
             return;
         }
-        let Self { flights, clear, surface, surface_speed, at_surface, .. } = self;
-        for ((slot, flight), clear) in (0..).zip(&*flights).zip(clear) {
-            let room = clear.gap - reach - *surface_speed * (now - clear.clock).abs();
-            let moved = (flight.position - clear.from).norm_squared();
-            if (room > 0.0 && moved < room * room) || clear.passes {
-                continue;
-            }
-            let gap = surface.gap(&Flight { time: after, ..*flight }, reach + SIGHT * flight.radius);
-            *clear = Clear { from: flight.position, clock: now, gap, ..*clear };
-            if gap < reach {
-                at_surface.push(slot);
+        for slot in 0..self.len() {
+            if self.is_near_surface(slot, after, reach) {
+                self.at_surface.push(slot as u32);
             }
         }
+    }
+
+    /// Whether a grain is nearer to the surface than `reach` (m) `after` seconds into the step and does not pass through it.
+    #[inline]
+    fn is_near_surface(&mut self, slot: usize, after: f64, reach: f64) -> bool {
+        let (flight, clear) = (&self.flights[slot], &mut self.clear[slot]);
+        let now = self.clock + after;
+        let room = clear.gap - reach - self.surface_speed * (now - clear.clock).abs();
+        let moved = (flight.position - clear.from).norm_squared();
+        if (room > 0.0 && moved < room * room) || clear.passes {
+            return false;
+        }
+        let gap = self.surface.gap(&Flight { time: after, ..*flight }, reach + SIGHT * flight.radius);
+        *clear = Clear { from: flight.position, clock: now, gap, ..*clear };
+        gap < reach
     }
 
     /// Pairs of slots, the lower one first, each once: all that may be nearer to each other than asked of [`look`](Self::look), and others that
@@ -216,19 +245,19 @@ impl Crowd {
         &self.at_surface
     }
 
-    /// How two grains stand to each other now; nothing where they are `reach` (m) or farther apart, or their centres coincide.
-    #[inline]
-    #[must_use]
-    pub fn near(&self, [a, b]: [u32; 2], reach: f64) -> Option<Near> {
-        let (a, b) = (&self.flights[a as usize], &self.flights[b as usize]);
-        let apart = self.domain.nearest(b.position - a.position);
-        let (squared, contact) = (apart.norm_squared(), a.radius + b.radius);
-        let most = contact + reach;
-        if squared < most * most && squared > 0.0 {
-            let distance = squared.sqrt();
-            return Some(Near { normal: apart / distance, gap: distance - contact });
+    /// Puts into `found` the [`pairs`](Self::pairs) that overlap now, and how; not those whose centres coincide.
+    pub fn touching(&self, found: &mut Vec<([u32; 2], Near)>) {
+        found.clear();
+        for &pair in self.pairs() {
+            let [a, b] = pair.map(|slot| &self.flights[slot as usize]);
+            let apart = self.domain.nearest(b.position - a.position);
+            let (squared, contact) = (apart.norm_squared(), a.radius + b.radius);
+            // Hardly any pair gets any farther.
+            if squared < contact * contact && squared > 0.0 {
+                let distance = squared.sqrt();
+                found.push((pair, Near { normal: apart / distance, gap: distance - contact }));
+            }
         }
-        None
     }
 
     /// Puts into `found` how a grain stands to the surface `after` seconds into the step, with the elements: each contact nearer than `reach` (m),

@@ -8,13 +8,14 @@
 //!
 //! ```
 //! use impinge::law::resolve_pair;
-//! use impinge::scheme::stepped::{Crowd, Method, even};
+//! use impinge::scheme::stepped::{Crowd, Method, Near, even};
 //! use impinge::scheme::{Broken, Observer};
 //!
 //! /// Overlap first, then reverse.
 //! #[derive(Clone, Debug)]
 //! struct Naive {
 //!     step: f64,
+//!     touching: Vec<([u32; 2], Near)>,
 //! }
 //!
 //! impl Method for Naive {
@@ -24,9 +25,8 @@
 //!             flight.position += flight.velocity * step;
 //!         }
 //!         crowd.look(step, 0.0);
-//!         for k in 0..crowd.pairs().len() {
-//!             let pair = crowd.pairs()[k];
-//!             let Some(near) = crowd.near(pair, 0.0) else { continue };
+//!         crowd.touching(&mut self.touching);
+//!         for &(pair, near) in &self.touching {
 //!             let contact = resolve_pair(&crowd.laws().grain, &crowd.body(pair[0]), &crowd.body(pair[1]), near.normal);
 //!             if contact.approach_speed > 0.0 && !crowd.shields(pair) {
 //!                 pair.into_iter().zip(&contact.after).for_each(|(slot, after)| crowd.put(slot, after));

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use rustc_hash::FxHashSet;
 
 use crate::law::{Body, resolve_pair, resolve_surface};
-use crate::scheme::stepped::{Crowd, approaches};
+use crate::scheme::stepped::{Crowd, Near, approaches};
 use crate::scheme::{Broken, Observer};
 
 /// The surface as the partner of a grain.
@@ -21,6 +21,8 @@ pub(super) struct Impulses {
     touched: Vec<u32>,
     /// What each grain has got, m/s and rad/s; 0 between steps.
     jumps: Vec<Jump>,
+    /// Pairs that overlap.
+    touching: Vec<([u32; 2], Near)>,
     /// Contacts of one grain with the surface.
     found: Vec<(u32, SurfaceContact)>,
 }
@@ -51,16 +53,21 @@ impl Impulses {
     /// Looks for contacts where the grains are now, `after` seconds into the step, and says whether there were any new ones.
     pub(super) fn find(&mut self, crowd: &mut Crowd, after: f64, observer: &mut impl Observer) -> Result<bool, Broken> {
         let known = self.touched.len();
-        crowd.look(after, 0.0);
+        // Without a near field only those move from one iterate to the next that contacts have changed.
+        if known == 0 || crowd.has_near_field() {
+            crowd.look(after, 0.0);
+        } else {
+            crowd.look_again(&self.touched, after, 0.0);
+        }
         self.find_pairs(crowd, after, observer);
         self.find_hits(crowd, after, observer)?;
         Ok(self.touched.len() > known)
     }
 
     fn find_pairs(&mut self, crowd: &mut Crowd, after: f64, observer: &mut impl Observer) {
-        for k in 0..crowd.pairs().len() {
-            let pair = crowd.pairs()[k];
-            let Some(near) = crowd.near(pair, 0.0) else { continue };
+        crowd.touching(&mut self.touching);
+        for k in 0..self.touching.len() {
+            let (pair, near) = self.touching[k];
             let before = pair.map(|slot| crowd.body(slot));
             let contact = resolve_pair(&crowd.laws().grain, &before[0], &before[1], near.normal);
             let speeds = before[0].velocity.amax() + before[1].velocity.amax();
