@@ -55,7 +55,7 @@ pub(crate) struct Near {
     here: Vec<u32>,
     /// Others, and the shift (m) that brings their periodic images there.
     pub(crate) beyond: Vec<(u32, Vector3<f64>)>,
-    /// Those of which the second and later ones of a cell are made, kept for its memory.
+    /// Further grains of cells of which one was seen, and the numbers of these cells; kept for its memory.
     more: Vec<Link>,
 }
 
@@ -69,7 +69,7 @@ impl Near {
         self.count + self.beyond.len()
     }
 
-    /// Those that are where their stored positions say, by twos; the last may stand alone with any grain.
+    /// Those that are where their stored positions say, by twos, and how many they are: if that is odd, any grain stands beside the last.
     #[inline]
     pub(crate) fn here(&self) -> (&[[u32; 2]], usize) {
         (&self.here.as_chunks().0[..self.count.div_ceil(2)], self.count)
@@ -493,8 +493,8 @@ impl Cells {
         }
     }
 
-    /// Writes the grains in those cells around the cell with the number `centre` whose bits are set into `here`; gives how many there are, and whether one of them is [`TURNED`].
-    /// Nothing if there is not enough room in `here`, or in `more`.
+    /// Writes the grains in those cells around the cell with the number `centre` whose bits are set, but for `id`, into `here`; gives how many they
+    /// are, and whether one of them is [`TURNED`]. Gives nothing where `here`, or `more`, has not room enough.
     #[inline]
     fn all_here(
         &self,
@@ -528,7 +528,8 @@ impl Cells {
         }
     }
 
-    /// Adds the grains in those cells around a place, that of the cell with the number `centre`, whose bits are set, but for `id`; there may be none in some of them.
+    /// Adds the grains in those cells around a place, that of the cell with the number `centre`, whose bits are set, but for `id`, with their shifts.
+    /// There may be none in some of these cells.
     fn add_beyond(&self, id: u32, place: Place, centre: u32, mut wanted: u32, near: &mut Near) {
         let offsets = &self.offsets[place.edges as usize];
         while wanted != 0 {
