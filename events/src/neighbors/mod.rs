@@ -20,6 +20,8 @@ use crate::{Domain, Flight};
 
 /// A crossing costs about as much as so many looks at a neighbour. From 5 to 20 no jet and no gas becomes slower by more than 3 %.
 const LOOKS_PER_CROSSING: f64 = 14.0;
+/// Room for neighbours to begin with: hardly ever are there more where grains are of one size.
+const FEWEST_NEAR: usize = 64;
 /// The grid is laid out anew when there are so many times as many grains as it was made for, or as the fewest that are worth it.
 const CROWD: usize = 4;
 const FEWEST_GRAINS: usize = 16;
@@ -84,7 +86,7 @@ impl Near {
     /// Makes room for twice as many.
     #[cold]
     fn grow(&mut self) {
-        let room = (2 * self.here.len()).max(64);
+        let room = (2 * self.here.len()).max(FEWEST_NEAR);
         self.here.resize(room, 0);
         self.more.resize(room, Link { number: 0, next: 0 });
     }
@@ -151,21 +153,17 @@ const AHEAD: [u32; 6] = {
 /// The bits of those of the 27 cells around a cell that are beyond the period, for each kind of edge.
 const BEYOND: [u32; 27] = {
     let mut beyond = [0; 27];
-    let mut edges = 0;
-    while edges < 27 {
-        let mut number = 0;
-        while number < 27 {
-            let mut axis = 0;
-            while axis < 3 {
-                let step = steps(edges)[axis];
-                if step != 0 && steps(number)[axis] == step {
-                    beyond[edges] |= 1 << number;
-                }
-                axis += 1;
+    let mut number = 0;
+    while number < 27 {
+        let mut axis = 0;
+        while axis < 3 {
+            let step = steps(number)[axis];
+            if step != 0 {
+                beyond[number] |= AHEAD[2 * axis + (step > 0) as usize];
             }
-            number += 1;
+            axis += 1;
         }
-        edges += 1;
+        number += 1;
     }
     beyond
 };
