@@ -87,11 +87,10 @@ pub fn spheres_may_touch(a: &Flight, b: &Flight, shift: Vector3<f64>, until: f64
     let r = b.position_at(a.time) - a.position + shift;
     let s = a.radius + b.radius;
     let (approach, v2) = (-r.dot(&v), v.norm_squared());
-    let separation = r.norm_squared() - s * s;
+    let separation = r.norm_squared() * (1.0 - CAUTION) - s * s * (1.0 + CAUTION);
     // r² - s² falls by less than 2 approach t within t.
-    let in_time = separation <= 2.0 * approach * (until - a.time) + CAUTION * (separation.abs() + s * s);
-    // Of a pair far apart both sides are much larger than their difference.
-    let on_course = v2 * separation <= approach * approach * (1.0 + FAR_CAUTION) + CAUTION * s * s * v2;
+    let in_time = separation <= approach * (2.0 * (until - a.time));
+    let on_course = v2 * separation <= approach * approach;
     // Where squares of speeds underflow nothing is known.
     in_time & on_course | (v2 < SMALLEST_SPEED_SQUARED)
 }
@@ -109,17 +108,16 @@ pub fn spheres_may_touch_two(a: &Flight, others: [&Flight; 2], until: f64) -> u3
     let r: [f64x2; 3] = std::array::from_fn(|axis| position[axis] + velocity[axis] * later - a.position[axis]);
     let s = two(|b| b.radius) + a.radius;
     let (approach, v2, s2) = (-dot(r, v), dot(v, v), s * s);
-    let separation = dot(r, r) - s2;
-    let in_time = separation.simd_le(approach * (2.0 * (until - a.time)) + (separation.abs() + s2) * CAUTION);
-    let on_course = (v2 * separation).simd_le(approach * approach * (1.0 + FAR_CAUTION) + s2 * v2 * CAUTION);
+    let separation = dot(r, r) * (1.0 - CAUTION) - s2 * (1.0 + CAUTION);
+    let in_time = separation.simd_le(approach * (2.0 * (until - a.time)));
+    let on_course = (v2 * separation).simd_le(approach * approach);
     let unknown = v2.simd_lt(f64x2::splat(SMALLEST_SPEED_SQUARED));
     (in_time & on_course | unknown).to_bitmask()
 }
 
-/// What rounding may do to a bound, relative: much more than it does (as far as 1e9 radii from the origin), and too little to let many pairs pass.
+/// What rounding may do to the squares of distances in a bound, relative: much more than it does (as far as 1e9 radii from the origin), and too little to
+/// let many pairs pass that are not a thousand radii apart.
 const CAUTION: f64 = 1e-6;
-/// What it may do to a square of distances, relative.
-const FAR_CAUTION: f64 = 1.0 / (1u64 << 46) as f64;
 
 /// Below this relative speed squared ((1e-140 m/s)²) the products of the root would underflow.
 const SMALLEST_SPEED_SQUARED: f64 = 1e-280;

@@ -65,10 +65,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
                 cells.fetch_cells(region);
             }
             if let Some(region) = region(self.ahead.before_last(2 * BETWEEN_STAGES)) {
-                cells.visit_first_in_cells(region, |grain| {
-                    prefetch(&self.flights, grain as usize);
-                    cells.fetch_place(grain);
-                });
+                cells.visit_first_in_cells(region, |grain| prefetch(&self.flights, grain as usize));
             }
         }
         self.ahead.coming = coming;

@@ -56,7 +56,7 @@ enum Neighbors {
 }
 
 impl Neighbors {
-    /// Adds every grain that can soon touch `grain` to `near`, which is empty.
+    /// Adds every grain that can soon touch `grain` to `near`, which is empty; now and then one is there twice.
     #[inline]
     fn add(&self, grain: u32, near: &mut Near) {
         match self {
@@ -64,6 +64,12 @@ impl Neighbors {
             Self::Cells(cells) => cells.add_around(grain, near),
             Self::Lists(lists) => near.beyond.extend_from_slice(lists.of(grain)),
         }
+    }
+
+    /// Adds every grain that can soon touch `grain` to `near`, which is empty, once.
+    fn add_each_once(&self, grain: u32, near: &mut Near) {
+        self.add(grain, near);
+        near.each_once();
     }
 }
 

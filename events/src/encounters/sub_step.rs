@@ -28,7 +28,7 @@ impl<'a> Vicinity<'a> {
     /// image that is meant.
     pub fn around(&mut self, grain: u32, mut visit: impl FnMut(u32, Vector3<f64>)) {
         self.near.clear();
-        self.neighbors.add(grain, &mut self.near);
+        self.neighbors.add_each_once(grain, &mut self.near);
         self.near.iter().for_each(|(other, shift)| visit(other, shift));
     }
 }
@@ -77,7 +77,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         let ours = self.flight(grain);
         let place = ours.position_at(time);
         let mut near = Near::default();
-        self.neighbors.add(grain, &mut near);
+        self.neighbors.add_each_once(grain, &mut near);
         for (other, shift) in near.iter() {
             let theirs = self.flight(other);
             let apart = theirs.position_at(time) + shift - place;
@@ -122,7 +122,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         for a in self.inside() {
             let (ours, radius) = (place(a), self.flight(a).radius);
             near.clear();
-            self.neighbors.add(a, &mut near);
+            self.neighbors.add_each_once(a, &mut near);
             for (b, shift) in near.iter().filter(|&(b, _)| a < b) {
                 let other = self.flight(b).radius;
                 let overlap = radius + other - (place(b) + shift - ours).norm();
@@ -138,7 +138,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         for a in self.inside() {
             let ours = self.flights[a as usize];
             near.clear();
-            self.neighbors.add(a, &mut near);
+            self.neighbors.add_each_once(a, &mut near);
             for (b, shift) in near.iter() {
                 let theirs = self.flights[b as usize];
                 let apart = theirs.position + shift - ours.position;

@@ -11,17 +11,15 @@ mod layout;
 mod slots;
 
 use nalgebra::Vector3;
-use wide::f64x4;
+use wide::{f64x4, u32x4};
 
 use self::layout::{FEWEST_PERIODIC_CELLS, Layout, contact_width};
-use self::slots::Slots;
+use self::slots::{Block, Slots};
 use crate::prefetch::prefetch;
 use crate::{Domain, Flight};
 
 /// A crossing costs about as much as so many looks at a neighbour. From 5 to 20 no jet and no gas becomes slower by more than 3 %.
 const LOOKS_PER_CROSSING: f64 = 14.0;
-/// Room for neighbours to begin with: hardly ever are there more where grains are of one size.
-const FEWEST_NEAR: usize = 64;
 /// The grid is laid out anew when there are so many times as many grains as it was made for, or as the fewest that are worth it.
 const CROWD: usize = 4;
 const FEWEST_GRAINS: usize = 16;
@@ -39,16 +37,6 @@ pub fn least_period(radius: f64) -> f64 {
     f64::from(FEWEST_PERIODIC_CELLS) * contact_width(radius)
 }
 
-/// A grain in the list of those that share its slot.
-#[derive(Clone, Copy, Debug)]
-struct Link {
-    /// The number of its cell, before it is taken modulo the number of slots: hardly ever that of another cell, whose grains would be
-    /// looked at in vain.
-    number: u32,
-    /// The next one, and the bit [`TURNED`] if its own cell lies beyond the period.
-    next: u32,
-}
-
 /// Grains that are near another one.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Near {
@@ -57,8 +45,6 @@ pub(crate) struct Near {
     here: Vec<u32>,
     /// Others, and the shift (m) that brings their periodic images there.
     pub(crate) beyond: Vec<(u32, Vector3<f64>)>,
-    /// Further grains of cells of which one was seen, and the numbers of these cells; kept for its memory.
-    more: Vec<Link>,
 }
 
 impl Near {
@@ -83,12 +69,26 @@ impl Near {
         here.chain(self.beyond.iter().copied())
     }
 
-    /// Makes room for twice as many.
-    #[cold]
-    fn grow(&mut self) {
-        let room = (2 * self.here.len()).max(FEWEST_NEAR);
-        self.here.resize(room, 0);
-        self.more.resize(room, Link { number: 0, next: 0 });
+    /// Leaves each of them only once, in the order of their numbers.
+    pub(crate) fn each_once(&mut self) {
+        let here = &mut self.here[..self.count];
+        here.sort_unstable();
+        let mut count = 0;
+        for at in 0..here.len() {
+            if count == 0 || here[count - 1] != here[at] {
+                here[count] = here[at];
+                count += 1;
+            }
+        }
+        self.count = count;
+    }
+
+    /// Makes room for so many.
+    #[inline]
+    fn make_room(&mut self, grains: usize) {
+        if self.here.len() < grains {
+            self.here.resize(grains.next_power_of_two(), 0);
+        }
     }
 }
 
@@ -97,8 +97,12 @@ impl Near {
 struct Place {
     /// Cell along each axis, as the stored position of the grain sees it: in a periodic domain it may lie beyond the period.
     cell: Vector3<i32>,
+    /// Number of the cell, before it is taken modulo the number of slots.
+    number: u32,
     /// At which ends of the period it lies: as the number of that of the 27 cells around a cell to which one would step there.
-    edges: u32,
+    edges: u8,
+    /// Whether it lies beyond the period.
+    turned: bool,
 }
 
 /// Some of the 27 cells around a cell and itself.
@@ -107,16 +111,18 @@ pub(crate) struct Region {
     /// Number of the cell in the middle.
     number: u32,
     /// At which ends of the period it lies.
-    edges: u32,
+    edges: u8,
     /// The bits of the cells.
     wanted: u32,
 }
 
 /// At no end of the period.
-const INSIDE: u32 = 13;
+const INSIDE: u8 = 13;
 /// What a step along each axis adds to the number of one of the 27 cells around a cell.
-const THREE_TO: [u32; 3] = [1, 3, 9];
-const NOWHERE: Place = Place { cell: Vector3::new(0, 0, 0), edges: INSIDE };
+const THREE_TO: [u8; 3] = [1, 3, 9];
+const NOWHERE: Place = Place { cell: Vector3::new(0, 0, 0), number: 0, edges: INSIDE, turned: false };
+/// The bit of a cell itself among the 27 around it.
+const OWN: u32 = 1 << INSIDE;
 
 /// A crossing: when, and into which cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -186,10 +192,9 @@ pub(crate) struct Cells {
     /// The bits of the 27 cells around a cell that can hold grains which touch one in it.
     around: u32,
     slots: Slots,
-    links: Vec<Link>,
     places: Vec<Place>,
-    /// What the cells around a cell add to its number, for each kind of edge.
-    offsets: Box<[[u32; 27]; 27]>,
+    /// What the 27 cells around a cell add to its number (and nothing more, to fill up), for each kind of edge.
+    offsets: Box<[[u32; 32]; 27]>,
 }
 
 impl Cells {
@@ -217,9 +222,8 @@ impl Cells {
         // In a planar scene nobody is beside the plane.
         let beside = if domain.planar { AHEAD[2] | AHEAD[3] } else { 0 };
         let around = ((1 << 27) - 1) & !beside;
-        let slots = Slots::new(layout.cells(), grains, NOBODY);
-        let (links, places) = (Vec::new(), Vec::new());
-        Self { layout, domain, made_for: grains, everywhere, around, slots, links, places, offsets }
+        let slots = Slots::new(layout.cells(), grains);
+        Self { layout, domain, made_for: grains, everywhere, around, slots, places: Vec::new(), offsets }
     }
 
     /// An empty grid that suits `flights` better, if it is worth its cost; `crossings` and `looks` are what this one took lately.
@@ -271,48 +275,48 @@ impl Cells {
     }
 
     /// What each of the 27 cells around a cell and itself adds to its number, where periods end at the sides that `edges` tells.
-    fn offsets(layout: &Layout, edges: usize) -> [u32; 27] {
+    fn offsets(layout: &Layout, edges: usize) -> [u32; 32] {
         let offset = |number: usize, axis: usize| {
             let (step, edge) = (steps(number)[axis], steps(edges)[axis]);
             layout.along(axis, if edge == step { step - layout.period[axis] * step } else { step })
         };
-        std::array::from_fn(|number| (0..3).fold(0, |sum: u32, axis| sum.wrapping_add(offset(number, axis))))
+        let cell = |number: usize| (0..3).fold(0, |sum: u32, axis| sum.wrapping_add(offset(number, axis)));
+        std::array::from_fn(|number| if number < 27 { cell(number) } else { 0 })
     }
 
-    /// The place of a cell, its number, and [`TURNED`] if it lies beyond the period.
+    /// The place of a grain in a cell.
     #[inline]
-    fn place(&self, cell: Vector3<i32>) -> (Place, u32, u32) {
-        let (mut number, mut edges, mut turned) = (self.layout.first_number, INSIDE, 0);
+    fn place(&self, cell: Vector3<i32>) -> Place {
+        let (mut number, mut edges, mut turned) = (self.layout.first_number, INSIDE, false);
         for axis in 0..3 {
             let period = self.layout.period[axis];
             let mut home = cell[axis];
             if period > 0 {
                 if home as u32 >= period as u32 {
                     home = home.rem_euclid(period);
-                    turned = TURNED;
+                    turned = true;
                 }
-                edges += THREE_TO[axis] * u32::from(home + 1 == period);
-                edges -= THREE_TO[axis] * u32::from(home == 0);
+                edges += THREE_TO[axis] * u8::from(home + 1 == period);
+                edges -= THREE_TO[axis] * u8::from(home == 0);
             }
             number = number.wrapping_add(self.layout.along(axis, home));
         }
-        (Place { cell, edges }, number, turned)
+        Place { cell, number, edges, turned }
     }
 
     /// Puts grain `id` into the cell where it is at `now` (s, epoch time).
     pub(crate) fn insert(&mut self, id: u32, flight: &Flight, now: f64) {
-        if self.links.len() <= id as usize {
-            self.links.resize(id as usize + 1, Link { number: 0, next: NOBODY });
+        if self.places.len() <= id as usize {
             self.places.resize(id as usize + 1, NOWHERE);
         }
-        self.link(id, self.cell_of(flight.position_at(now), now));
+        self.enter(id, self.cell_of(flight.position_at(now), now));
     }
 
     #[inline]
-    fn link(&mut self, id: u32, cell: Vector3<i32>) {
-        let (place, number, turned) = self.place(cell);
+    fn enter(&mut self, id: u32, cell: Vector3<i32>) {
+        let place = self.place(cell);
         self.places[id as usize] = place;
-        self.links[id as usize] = Link { number, next: self.slots.replace_first(number, id, NOBODY) | turned };
+        self.slots.insert(place.number, if place.turned { id | TURNED } else { id });
     }
 
     /// Whether grain `id` stands in the cell where it is at `now` (s, epoch time).
@@ -328,31 +332,15 @@ impl Cells {
     /// Takes grain `id` out.
     #[inline]
     pub(crate) fn remove(&mut self, id: u32) {
-        let Link { number, next } = self.links[id as usize];
-        let next = next & !TURNED;
-        // Few grains share a slot.
-        let mut other = self.slots.first(number);
-        if other == id {
-            self.slots.replace_first(number, next, NOBODY);
-            return;
-        }
-        loop {
-            let after = &mut self.links[other as usize].next;
-            if *after & !TURNED == id {
-                *after = *after & TURNED | next;
-                return;
-            }
-            other = *after & !TURNED;
-        }
+        self.slots.remove(self.places[id as usize].number, id);
     }
 
     /// Tells the grid that a periodic wrap has moved the stored position of `id` by `shift`.
     pub(crate) fn wrapped(&mut self, id: u32, shift: Vector3<f64>) {
         let turns = shift.component_div(&self.domain.extent()).map(|x| x.round() as i32);
-        let (place, _, turned) = self.place(self.places[id as usize].cell + turns.component_mul(&self.layout.period));
+        let place = self.place(self.places[id as usize].cell + turns.component_mul(&self.layout.period));
         self.places[id as usize] = place;
-        let next = &mut self.links[id as usize].next;
-        *next = *next & !TURNED | turned;
+        self.slots.turn(place.number, id, if place.turned { TURNED } else { 0 });
     }
 
     /// When and through which side `flight` leaves its cell.
@@ -390,32 +378,30 @@ impl Cells {
         self.remove(id);
         let mut cell = self.places[id as usize].cell;
         cell[axis] += step;
-        self.link(id, cell);
+        self.enter(id, cell);
     }
 
     /// Adds to `near` every grain in the cells that have become adjacent to grain `id` when it went through a `side` of its cell.
     #[inline]
     pub(crate) fn add_ahead(&self, id: u32, side: u8, near: &mut Near) {
-        self.add(id, self.places[id as usize], self.links[id as usize], AHEAD[usize::from(side)] & self.around, near);
+        self.add::<false>(id, &self.places[id as usize], AHEAD[usize::from(side)] & self.around, near);
     }
 
     /// Adds to `near` every grain in the cells around grain `id`.
     #[inline]
     pub(crate) fn add_around(&self, id: u32, near: &mut Near) {
-        self.add(id, self.places[id as usize], self.links[id as usize], self.around, near);
+        self.add::<true>(id, &self.places[id as usize], self.around, near);
     }
 
     /// Adds to `near` every grain in the cells around `position`, where there need not be a grain.
     pub(crate) fn add_near(&self, position: Vector3<f64>, time: f64, near: &mut Near) {
-        let (place, number, turned) = self.place(self.cell_of(position, time));
-        self.add(NOBODY, place, Link { number, next: turned }, self.around, near);
+        self.add::<true>(NOBODY, &self.place(self.cell_of(position, time)), self.around, near);
     }
 
     /// Asks the memory for the place of grain `id`.
     #[inline]
     pub(crate) fn fetch_place(&self, id: u32) {
         prefetch(&self.places, id as usize);
-        prefetch(&self.links, id as usize);
     }
 
     /// Where the next search for grain `id` will look: ahead, if it then goes through a `side` of its cell, or else all around; nowhere if it has
@@ -423,8 +409,7 @@ impl Cells {
     #[inline]
     pub(crate) fn region_of_next_search(&self, id: u32, side: Option<u8>) -> Option<Region> {
         // Since it was said to come it may have been taken out, and cells laid out that never saw it.
-        let edges = self.places.get(id as usize)?.edges;
-        let number = self.links.get(id as usize)?.number;
+        let Place { number, edges, .. } = *self.places.get(id as usize)?;
         let Some(side) = side else { return Some(Region { number, edges, wanted: self.around }) };
         let (axis, step) = axis_and_step(side);
         let wanted = AHEAD[usize::from(side)] & self.around;
@@ -442,7 +427,7 @@ impl Cells {
         }
     }
 
-    /// Visits the first grain in each slot of a region.
+    /// Visits the grains in each cell of a region, but for those beyond the first few.
     #[inline]
     pub(crate) fn visit_first_in_cells(&self, region: Region, mut visit: impl FnMut(u32)) {
         let offsets = &self.offsets[region.edges as usize];
@@ -457,90 +442,99 @@ impl Cells {
         while occupied != 0 {
             let around = occupied.trailing_zeros() as usize;
             occupied &= occupied - 1;
-            visit(self.slots.glance(region.number.wrapping_add(offsets[around])).0);
+            self.slots.glance(region.number.wrapping_add(offsets[around])).0.grains().for_each(&mut visit);
         }
     }
 
-    /// Adds to `near`, which is empty, the grains in those of the 27 cells around a place whose bits are set, but for `id`.
+    /// Adds to `near`, which is empty, the grains in those of the 27 cells around a place whose bits are set, but for `id`: the cell in the middle is among
+    /// them if they are all `AROUND`.
     ///
-    /// In which cells there are grains, and how many, cannot be foretold, and a wrong guess costs a processor as much as a look: so all that are
-    /// found are written down, and those that do not count are overwritten.
-    fn add(&self, id: u32, place: Place, link: Link, wanted: u32, near: &mut Near) {
+    /// In which cells there are grains, and how many, cannot be foretold, and a wrong guess costs a processor as much as a look: so whole blocks are
+    /// written down, and what does not count is overwritten. Grains of other cells that share a slot are among them, and now and then a grain is
+    /// twice: that costs a look, and changes nothing.
+    fn add<const AROUND: bool>(&self, id: u32, place: &Place, wanted: u32, near: &mut Near) {
         let offsets = &self.offsets[place.edges as usize];
         let mut occupied = 0;
         for row in 0..9 {
-            let number = link.number.wrapping_add(offsets[3 * row + 1]);
+            let number = place.number.wrapping_add(offsets[3 * row + 1]);
             occupied |= u32::from(self.slots.occupied(number)) << (3 * row);
         }
         // Where a row goes on at the other end of the period nobody has looked.
         let beyond = BEYOND[place.edges as usize];
         occupied = (occupied | beyond) & wanted;
-        let mut here = if link.next & TURNED == 0 { occupied & !beyond } else { 0 };
-        while here != 0 {
-            match self.all_here(id, offsets, link.number, here, &mut near.here, &mut near.more) {
-                Some((count, false)) => {
-                    near.count = count;
-                    break;
-                }
-                Some((_, true)) => here = 0,
-                None => near.grow(),
-            }
+        let mut here = if place.turned { 0 } else { occupied & !beyond };
+        if here != 0 && !self.add_here::<AROUND>(id, offsets, place.number, here, near) {
+            (here, near.count) = (0, 0);
         }
         if occupied != here {
-            self.add_beyond(id, place, link.number, occupied & !here, near);
+            self.add_beyond(id, place, occupied & !here, near);
         }
     }
 
-    /// Writes the grains in those cells around the cell with the number `centre` whose bits are set, but for `id`, into `here`; gives how many they
-    /// are, and whether one of them is [`TURNED`]. Gives nothing where `here`, or `more`, has not room enough.
+    /// Adds the grains in those cells around the cell with the number `centre` whose bits are set, but for `id`. Gives false, and what it has added is
+    /// wrong, if one of them is [`TURNED`].
     #[inline]
-    fn all_here(
-        &self,
-        id: u32,
-        offsets: &[u32; 27],
-        centre: u32,
-        mut occupied: u32,
-        here: &mut [u32],
-        more: &mut [Link],
-    ) -> Option<(usize, bool)> {
-        let (mut count, mut turned, mut found, mut at) = (0, 0, 0, 0);
-        loop {
-            let Link { number, next: other } = if occupied != 0 {
-                let around = occupied.trailing_zeros() as usize;
-                occupied &= occupied - 1;
-                let number = centre.wrapping_add(offsets[around]);
-                Link { number, next: self.slots.first(number) }
-            } else if at < found {
-                at += 1;
-                more[at - 1]
-            } else {
-                return Some((count, turned & TURNED != 0));
-            };
-            let theirs = self.links[other as usize];
-            turned |= theirs.next;
-            *here.get_mut(count)? = other;
-            count += usize::from((theirs.number == number) & (other != id));
-            let next = theirs.next & !TURNED;
-            *more.get_mut(found)? = Link { number, next };
-            found += usize::from(next != NOBODY);
+    fn add_here<const AROUND: bool>(&self, id: u32, offsets: &[u32; 32], centre: u32, occupied: u32, near: &mut Near) -> bool {
+        near.make_room(Block::ROOM * 28);
+        let (here, mut count, mut seen) = (&mut near.here[..], 0, u32x4::ZERO);
+        let mut cells = occupied & !OWN;
+        while cells != 0 {
+            let around = cells.trailing_zeros() as usize;
+            cells &= cells - 1;
+            let block = self.slots.first_block(centre.wrapping_add(offsets[around % 32]));
+            here[count..count + 4].copy_from_slice(&block.words);
+            count += block.count();
+            seen |= u32x4::from(block.words);
         }
+        if AROUND {
+            let block = self.slots.first_block(centre);
+            for (place, &other) in block.words[..Block::ROOM].iter().enumerate() {
+                here[count] = other;
+                count += usize::from((place < block.count()) & (other != id));
+            }
+            seen |= u32x4::from(block.words);
+        }
+        near.count = count;
+        let seen = seen.to_array();
+        if seen[Block::ROOM] > Block::ROOM as u32 {
+            return self.add_more(id, offsets, centre, occupied, near);
+        }
+        (seen[0] | seen[1] | seen[2]) & TURNED == 0
     }
 
-    /// Adds the grains in those cells around a place, that of the cell with the number `centre`, whose bits are set, but for `id`, with their shifts.
-    /// There may be none in some of these cells.
-    fn add_beyond(&self, id: u32, place: Place, centre: u32, mut wanted: u32, near: &mut Near) {
+    /// The same, once the first block of each cell has been added.
+    #[cold]
+    fn add_more(&self, id: u32, offsets: &[u32; 32], centre: u32, mut occupied: u32, near: &mut Near) -> bool {
+        let mut turned = 0;
+        while occupied != 0 {
+            let around = occupied.trailing_zeros() as usize;
+            occupied &= occupied - 1;
+            let mut block = self.slots.first_block(centre.wrapping_add(offsets[around]));
+            turned |= block.turned();
+            while let Some(next) = self.slots.next_block(block) {
+                near.make_room(near.count + 4);
+                for other in next.grains().filter(|&other| other != id) {
+                    near.here[near.count] = other;
+                    near.count += 1;
+                }
+                turned |= next.turned();
+                block = next;
+            }
+        }
+        turned == 0
+    }
+
+    /// Adds the grains in those cells around a place whose bits are set, but for `id`, with their shifts. There may be none in some of these cells.
+    fn add_beyond(&self, id: u32, place: &Place, mut wanted: u32, near: &mut Near) {
         let offsets = &self.offsets[place.edges as usize];
         while wanted != 0 {
             let around = wanted.trailing_zeros() as usize;
             wanted &= wanted - 1;
-            let number = centre.wrapping_add(offsets[around]);
-            let mut other = self.slots.first(number);
-            while other != NOBODY {
-                let theirs = self.links[other as usize];
-                if theirs.number == number && other != id {
+            let first = self.slots.first_block(place.number.wrapping_add(offsets[around]));
+            for block in std::iter::successors(Some(first), |block| self.slots.next_block(block)) {
+                for other in block.grains().filter(|&other| other != id) {
                     near.beyond.push((other, self.shift(other, place.cell, around)));
                 }
-                other = theirs.next & !TURNED;
             }
         }
     }

@@ -1,5 +1,6 @@
 //! The table of cells: hashed, so that memory follows the grains and not the domain; in a period, where cells are few enough, one slot a cell.
 
+use super::TURNED;
 use crate::prefetch::prefetch;
 
 /// Slots for each grain, at least; cells are no smaller than to have one each.
@@ -15,20 +16,62 @@ pub(super) fn slots(grains: usize) -> usize {
     (SLOTS_PER_GRAIN * grains).max(FEWEST).next_power_of_two()
 }
 
-/// The first grain in each slot, if there is one.
+/// Up to three grains of one slot, and where the rest are: all that a search wants to know, in 16 bytes.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(C, align(16))]
+pub(super) struct Block {
+    /// The first [`count`](Self::count) of the first three are grains, with the bit [`TURNED`] or without; the rest of these are 0. The last is how many
+    /// they are, and four times the index of the next block with grains of this slot, or 0 if there is none.
+    pub(super) words: [u32; 4],
+}
+
+impl Block {
+    /// So many grains fit.
+    pub(super) const ROOM: usize = 3;
+
+    /// How many grains are in the block.
+    #[inline]
+    pub(super) fn count(&self) -> usize {
+        (self.words[Self::ROOM] % 4) as usize
+    }
+
+    /// Where the next block is; 0 stands for nowhere.
+    #[inline]
+    fn next(&self) -> u32 {
+        self.words[Self::ROOM] / 4
+    }
+
+    /// Not 0 if one of its grains is [`TURNED`].
+    #[inline]
+    pub(super) fn turned(&self) -> u32 {
+        (self.words[0] | self.words[1] | self.words[2]) & TURNED
+    }
+
+    /// The grains in the block.
+    #[inline]
+    pub(super) fn grains(&self) -> impl Iterator<Item = u32> + use<> {
+        let words = self.words;
+        (0..self.count()).map(move |at| words[at] & !TURNED)
+    }
+}
+
+/// The grains in each slot.
 #[derive(Clone, Debug)]
 pub(super) struct Slots {
     /// What of the number of a cell tells its slot.
     mask: usize,
-    first: Vec<u32>,
+    /// The first block of each slot, and further ones, all of them full: these come after the slots.
+    blocks: Vec<Block>,
+    /// Further blocks that are free.
+    free: Vec<u32>,
     /// Whether there is a grain in the slot before each slot (bit 0), in it, and in the slot after it (bit 2): so an empty cell costs next to
     /// nothing.
     occupied: Vec<u8>,
 }
 
 impl Slots {
-    /// Empty slots for so many cells of a period, which have the numbers from 1 on, or else for so many grains. `nobody` stands for no grain.
-    pub(super) fn new(cells: Option<usize>, grains: usize, nobody: u32) -> Self {
+    /// Empty slots for so many cells of a period, which have the numbers from 1 on, or else for so many grains.
+    pub(super) fn new(cells: Option<usize>, grains: usize) -> Self {
         let (slots, mask) = match cells {
             // The first and the last slot have none beside them.
             Some(cells) => (cells + 2, usize::MAX),
@@ -37,53 +80,123 @@ impl Slots {
                 (slots, slots - 1)
             }
         };
-        Self { mask, first: vec![nobody; slots], occupied: vec![0; slots] }
+        Self { mask, blocks: vec![Block::default(); slots], free: Vec::new(), occupied: vec![0; slots] }
     }
 
-    /// The slot of the cell with this number.
+    /// Index of the first block of a cell.
     #[inline]
-    fn slot(&self, number: u32) -> usize {
+    fn first(&self, number: u32) -> usize {
         number as usize & self.mask
     }
 
-    /// The first grain in the slot of a cell, or nobody.
+    /// The first block of a cell.
     #[inline]
-    pub(super) fn first(&self, number: u32) -> u32 {
-        self.first[self.slot(number)]
+    pub(super) fn first_block(&self, number: u32) -> &Block {
+        &self.blocks[self.first(number)]
     }
 
-    /// Makes `grain`, or `nobody`, the first in the slot of a cell; gives the one that was.
+    /// The next one of the same cell.
     #[inline]
-    pub(super) fn replace_first(&mut self, number: u32, grain: u32, nobody: u32) -> u32 {
-        let slot = self.slot(number);
-        let before = std::mem::replace(&mut self.first[slot], grain);
-        if (before == nobody) != (grain == nobody) {
-            for (step, bit) in [(1, 0), (0, 1), (u32::MAX, 2)] {
-                let beside = self.slot(number.wrapping_add(step));
-                self.occupied[beside] ^= 1 << bit;
-            }
+    pub(super) fn next_block(&self, block: &Block) -> Option<&Block> {
+        (block.next() != 0).then(|| &self.blocks[block.next() as usize])
+    }
+
+    /// Puts `grain`, which may be [`TURNED`], into a cell.
+    #[inline]
+    pub(super) fn insert(&mut self, number: u32, grain: u32) {
+        let first = self.first(number);
+        let mut block = self.blocks[first];
+        if block.words[Block::ROOM] == 0 {
+            self.toggle(number);
         }
-        before
+        if block.count() == Block::ROOM {
+            block = Block { words: [0, 0, 0, 4 * self.set_aside(block)] };
+        }
+        block.words[block.count()] = grain;
+        block.words[Block::ROOM] += 1;
+        self.blocks[first] = block;
     }
 
-    /// Asks the memory for the slot of a cell.
-    #[inline]
-    pub(super) fn fetch(&self, number: u32) {
-        prefetch(&self.occupied, self.slot(number));
-        prefetch(&self.first, self.slot(number));
+    /// Keeps a full block elsewhere; gives its index.
+    #[cold]
+    fn set_aside(&mut self, block: Block) -> u32 {
+        if let Some(index) = self.free.pop() {
+            self.blocks[index as usize] = block;
+            return index;
+        }
+        self.blocks.push(block);
+        (self.blocks.len() - 1) as u32
     }
 
-    /// The first grain in the slot of a cell and whether the slots about it are occupied, or zeros where there is no such cell.
+    /// Takes `grain` out of its cell. Its place goes to the last one of the first block.
     #[inline]
-    pub(super) fn glance(&self, number: u32) -> (u32, u8) {
-        let slot = self.slot(number);
-        let or_zero = |found: Option<(&u32, &u8)>| found.map_or((0, 0), |(&first, &occupied)| (first, occupied));
-        or_zero(self.first.get(slot).zip(self.occupied.get(slot)))
+    pub(super) fn remove(&mut self, number: u32, grain: u32) {
+        let first = self.first(number);
+        let (index, place) = self.find(number, grain);
+        let mut block = self.blocks[first];
+        let last = block.count() - 1;
+        self.blocks[index].words[place] = block.words[last];
+        block = self.blocks[first];
+        block.words[last] = 0;
+        block.words[Block::ROOM] -= 1;
+        if block.words[Block::ROOM] == 0 {
+            self.toggle(number);
+        } else if last == 0 {
+            let next = block.next();
+            block = std::mem::take(&mut self.blocks[next as usize]);
+            self.free.push(next);
+        }
+        self.blocks[first] = block;
+    }
+
+    /// Says whether `grain` is [`TURNED`] (that bit, or 0).
+    pub(super) fn turn(&mut self, number: u32, grain: u32, turned: u32) {
+        let (index, place) = self.find(number, grain);
+        self.blocks[index].words[place] = grain | turned;
+    }
+
+    /// The block that holds `grain`, and where.
+    #[inline]
+    fn find(&self, number: u32, grain: u32) -> (usize, usize) {
+        let mut index = self.first(number);
+        loop {
+            let block = &self.blocks[index];
+            if let Some(place) = block.grains().position(|other| other == grain) {
+                return (index, place);
+            }
+            index = block.next() as usize;
+            assert!(index != 0, "grain {grain} is not in its cell");
+        }
+    }
+
+    /// Tells the slots beside a slot, and itself, that its first grain has come, or its last one has gone.
+    #[inline]
+    fn toggle(&mut self, number: u32) {
+        for (step, bit) in [(1, 0), (0, 1), (u32::MAX, 2)] {
+            let beside = self.first(number.wrapping_add(step));
+            self.occupied[beside] ^= 1 << bit;
+        }
     }
 
     /// Whether the slots before (bit 0), of (bit 1) and after (bit 2) that of a cell are occupied.
     #[inline]
     pub(super) fn occupied(&self, number: u32) -> u8 {
-        self.occupied[self.slot(number)]
+        self.occupied[self.first(number)]
+    }
+
+    /// Asks the memory for the slots about a cell.
+    #[inline]
+    pub(super) fn fetch(&self, number: u32) {
+        let first = self.first(number);
+        prefetch(&self.occupied, first);
+        prefetch(&self.blocks, first);
+    }
+
+    /// The grains in the first block of a cell and whether the slots about it are occupied; nothing where there is no such cell.
+    #[inline]
+    pub(super) fn glance(&self, number: u32) -> (Block, u8) {
+        let first = self.first(number);
+        let both = self.blocks.get(first).zip(self.occupied.get(first));
+        both.map_or_else(Default::default, |(&block, &occupied)| (block, occupied))
     }
 }
