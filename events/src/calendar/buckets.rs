@@ -8,9 +8,14 @@ use crate::prefetch::prefetch;
 
 /// Buckets for each event: as many as hold most of the waiting times when about one event is in each.
 const BUCKETS_PER_EVENT: usize = 2;
-/// The buckets are laid out anew when fewer events than this part of their number, or more than so many times their number, have come in a turn.
+/// The buckets are laid out anew when fewer events than this part of their number have come in a turn, or more than so many times their number in one of
+/// so many parts of it; where there are few buckets, more than that.
 const FEWEST_EVENTS: f64 = 0.25;
 const MOST_EVENTS: usize = 4;
+const PARTS_OF_TURN: i64 = 16;
+const FEWEST_IN_A_CROWD: usize = 256;
+/// Buckets are no narrower than this part of what the median of the waiting times would make them: or a turn of them would be too short.
+const NARROWEST: f64 = 1.0 / 64.0;
 /// So many buckets before theirs it is said who comes; about half as many events come until then.
 const ANNOUNCED: i64 = 24;
 /// So many buckets before that the first owner in each is fetched from memory.
@@ -40,8 +45,10 @@ pub struct Buckets {
     waiting: usize,
     /// Events that have come into the heap in this turn.
     passed: usize,
-    /// The same since the buckets were laid out, until this turn.
+    /// The same since the buckets were laid out, until this turn, and how many waited for later turns whenever one began.
     passed_before: usize,
+    /// The first bucket of the present part of a turn, and how many events had come by then.
+    part: (i64, usize),
     /// The bucket up to which it was said who comes.
     announced: i64,
 }
@@ -114,6 +121,7 @@ impl Default for Buckets {
             waiting: 0,
             passed: 0,
             passed_before: 0,
+            part: (0, 0),
             announced: 0,
         }
     }
@@ -198,6 +206,9 @@ impl Buckets {
                 continue;
             }
             self.now += 1;
+            if self.now - self.part.0 == self.buckets() / PARTS_OF_TURN {
+                self.part = (self.now, self.passed);
+            }
             let list = self.list(self.now);
             let mut owner = std::mem::replace(&mut self.first[list], NOBODY);
             while owner != NOBODY {
@@ -223,13 +234,14 @@ impl Buckets {
         let later = self.first.len() - 1;
         let mut owner = self.first[later];
         while owner != NOBODY {
+            self.passed_before += 1;
             next = next.min(self.bucket(self.owners[owner as usize].event.time));
             owner = self.owners[owner as usize].after;
         }
         self.turn = next & !(self.buckets() - 1);
         // The bucket before the next one: everybody is later.
         self.now = next.saturating_sub(1);
-        self.passed = 0;
+        (self.passed, self.part) = (0, (self.now, 0));
         owner = std::mem::replace(&mut self.first[later], NOBODY);
         while owner != NOBODY {
             let after = self.owners[owner as usize].after;
@@ -238,7 +250,15 @@ impl Buckets {
         }
     }
 
-    /// Chooses the number and the width of the buckets by the events that there are.
+    /// Whether so many events came lately that it pays to lay the buckets out anew.
+    #[inline]
+    fn is_crowded(&self) -> bool {
+        let crowd = MOST_EVENTS * self.first.len() / PARTS_OF_TURN as usize;
+        self.passed - self.part.1 > crowd.max(FEWEST_IN_A_CROWD)
+    }
+
+    /// Chooses the number and the width of the buckets by the events that there are, and by how many came lately: where few owners have most of the
+    /// events, these come much faster than half of all in the median time.
     #[cold]
     fn lay_out(&mut self) {
         let mut times: Vec<f64> =
@@ -250,12 +270,14 @@ impl Buckets {
         let (earlier, &mut median, _) = times.select_nth_unstable_by(count / 2, f64::total_cmp);
         self.origin = earlier.iter().copied().fold(median, f64::min);
         // Half of the events come until the median.
-        self.rate = (0.5 * count as f64 / (median - self.origin)).min(f64::MAX);
+        let until_median = (0.5 * count as f64 / (median - self.origin)).min(f64::MAX);
+        let lately = self.rate * (self.passed - self.part.1) as f64 / ((self.now - self.part.0) as f64 + 1.0);
+        self.rate = lately.clamp(until_median, until_median / NARROWEST).min(f64::MAX);
         self.first.clear();
         self.first.resize((BUCKETS_PER_EVENT * count).next_power_of_two() + 1, NOBODY);
         self.present.clear();
         (self.now, self.turn, self.announced) = (0, 0, 0);
-        (self.waiting, self.passed, self.passed_before) = (0, 0, 0);
+        (self.waiting, self.passed, self.passed_before, self.part) = (0, 0, 0, (0, 0));
         for owner in 0..self.owners.len() as u32 {
             if self.owners[owner as usize].event.time < f64::INFINITY {
                 self.enter(owner);
@@ -293,7 +315,7 @@ impl Calendar for Buckets {
 
     #[inline]
     fn next(&mut self) -> Option<(u32, Event)> {
-        if self.rate == 0.0 || self.passed > MOST_EVENTS * self.first.len() {
+        if self.rate == 0.0 || self.is_crowded() {
             self.lay_out();
         }
         loop {
@@ -314,7 +336,7 @@ impl Calendar for Buckets {
         self.first.fill(NOBODY);
         self.present.clear();
         (self.now, self.turn, self.announced) = (0, 0, 0);
-        (self.waiting, self.passed, self.passed_before) = (0, 0, 0);
+        (self.waiting, self.passed, self.passed_before, self.part) = (0, 0, 0, (0, 0));
         self.rate = 0.0;
     }
 
