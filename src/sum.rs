@@ -4,7 +4,8 @@ use std::ops::AddAssign;
 
 use nalgebra::Vector3;
 
-/// A compensated running sum (Neumaier 1974): what each addition rounds away is kept and added at the end.
+/// A compensated running sum (Neumaier 1974): what each addition rounds away is kept and added at the end. It is found without a branch (Knuth, The
+/// Art of Computer Programming 2, 1969, section 4.2.2).
 ///
 /// A plain sum of n terms is off by up to n ulp of the sum of magnitudes; this one by about one ulp of the sum, and n² ulp².
 ///
@@ -34,7 +35,8 @@ impl AddAssign<f64> for Sum {
     #[inline]
     fn add_assign(&mut self, term: f64) {
         let sum = self.sum + term;
-        self.lost += if self.sum.abs() >= term.abs() { (self.sum - sum) + term } else { (term - sum) + self.sum };
+        let added = sum - self.sum;
+        self.lost += (self.sum - (sum - added)) + (term - added);
         self.sum = sum;
     }
 }

@@ -83,6 +83,13 @@ impl Near {
         self.count = count;
     }
 
+    /// Says that there are so many. What stands beside the last is a grain, if it is looked at with it.
+    #[inline]
+    fn end_with(&mut self, count: usize) {
+        self.here[count] = 0;
+        self.count = count;
+    }
+
     /// Makes room for so many.
     #[inline]
     fn make_room(&mut self, grains: usize) {
@@ -474,7 +481,14 @@ impl Cells {
     /// Adds the grains in those cells around the cell with the number `centre` whose bits are set, but for `id`. Gives false, and what it has added is
     /// wrong, if one of them is [`TURNED`].
     #[inline]
-    fn add_here<const AROUND: bool>(&self, id: u32, offsets: &[u32; 32], centre: u32, occupied: u32, near: &mut Near) -> bool {
+    fn add_here<const AROUND: bool>(
+        &self,
+        id: u32,
+        offsets: &[u32; 32],
+        centre: u32,
+        occupied: u32,
+        near: &mut Near,
+    ) -> bool {
         near.make_room(Block::ROOM * 28);
         let (here, mut count, mut seen) = (&mut near.here[..], 0, u32x4::ZERO);
         let mut cells = occupied & !OWN;
@@ -494,7 +508,7 @@ impl Cells {
             }
             seen |= u32x4::from(block.words);
         }
-        near.count = count;
+        near.end_with(count);
         let seen = seen.to_array();
         if seen[Block::ROOM] > Block::ROOM as u32 {
             return self.add_more(id, offsets, centre, occupied, near);
@@ -515,7 +529,7 @@ impl Cells {
                 near.make_room(near.count + 4);
                 for other in next.grains().filter(|&other| other != id) {
                     near.here[near.count] = other;
-                    near.count += 1;
+                    near.end_with(near.count + 1);
                 }
                 turned |= next.turned();
                 block = next;
@@ -550,7 +564,65 @@ impl Cells {
 
 #[cfg(test)]
 mod tests {
+    use rand::{RngExt as _, SeedableRng as _};
+
     use super::*;
+
+    /// Crowded and empty cells, in a period and without: whoever is near is found, and what stands beside an odd last one is a grain (it was the number of a
+    /// block, and the search for partners went where no grain is).
+    #[test]
+    fn whoever_is_near_is_found_once_and_beside_the_last_stands_a_grain() {
+        let mut random = rand_pcg::Pcg64::seed_from_u64(5);
+        let (count, side, radius) = (600, 8.0, 0.4);
+        for periodic in [true, false] {
+            let (min, max) = (Vector3::zeros(), Vector3::repeat(side));
+            let domain = if periodic { Domain { min, max, periodic, planar: false } } else { Domain::unbounded() };
+            let mut flights: Vec<Flight> = (0..count)
+                .map(|number| {
+                    // Every second one in a corner.
+                    let within = if number % 2 == 0 { 0.25 * side } else { side };
+                    let position = Vector3::from_fn(|_, _| random.random_range(0.0..within));
+                    Flight { position, time: 0.0, velocity: Vector3::zeros(), radius }
+                })
+                .collect();
+            let mut cells = Cells::new(domain, radius, 0, &flights, 0.0);
+            (0..).zip(&flights).for_each(|(id, flight)| cells.insert(id, flight, 0.0));
+            for round in 0..4 {
+                for id in 0..count {
+                    let mut near = Near::default();
+                    let grains_only = |near: &Near| near.here().0.as_flattened().iter().all(|&other| other < count);
+                    for side in 0..6 {
+                        near.clear();
+                        cells.add_ahead(id, side, &mut near);
+                        assert!(grains_only(&near), "round {round}, grain {id}, side {side}");
+                    }
+                    near.clear();
+                    cells.add_around(id, &mut near);
+                    assert!(grains_only(&near), "round {round}, grain {id}");
+                    near.each_once();
+                    let touching = |place: Vector3<f64>| place.norm() < 2.0 * radius;
+                    let ours = flights[id as usize].position;
+                    let mut found: Vec<u32> = near
+                        .iter()
+                        .filter(|&(other, shift)| touching(flights[other as usize].position + shift - ours))
+                        .map(|(other, _)| other)
+                        .collect();
+                    found.sort_unstable();
+                    let all = (0..count).filter(|&other| {
+                        other != id && touching(domain.nearest(flights[other as usize].position - ours))
+                    });
+                    assert_eq!(found, all.collect::<Vec<_>>(), "round {round}, grain {id}");
+                }
+                // Some come back elsewhere.
+                for id in (0..count).filter(|id| id % 4 == round) {
+                    cells.remove(id);
+                    let position = Vector3::from_fn(|_, _| random.random_range(0.0..side));
+                    flights[id as usize].position = position;
+                    cells.insert(id, &flights[id as usize], 0.0);
+                }
+            }
+        }
+    }
 
     /// Cells that had grown with a spray were taken for as narrow as they were laid out: however many looks they cost, they stayed.
     #[test]
