@@ -18,7 +18,66 @@ const BOX_SLACK: f64 = 1.0 / (1u64 << 46) as f64;
 pub(super) struct Index {
     mesh: Mesh,
     bounds: Aabb<f64, 3>,
-    nodes: Vec<BvhNode<f64, 3>>,
+    /// What lies below the root first.
+    nodes: Vec<Node>,
+    root: Child,
+}
+
+/// A branch of the tree. Two boxes of short numbers and their children fill one line of the cache: to wait for memory is most of what a search costs.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+struct Node {
+    boxes: [ShortBox; 2],
+    children: [Child; 2],
+}
+
+const _: () = assert!(size_of::<Node>() == 64);
+
+/// A node, by its number, or, with the bit [`Child::TRIANGLE`], a triangle.
+#[derive(Clone, Copy, Debug)]
+struct Child(u32);
+
+impl Child {
+    const TRIANGLE: u32 = 1 << 31;
+
+    #[inline]
+    fn triangle(self) -> Option<usize> {
+        (self.0 & Self::TRIANGLE != 0).then_some((self.0 & !Self::TRIANGLE) as usize)
+    }
+}
+
+/// A box that holds another one, in numbers half as long.
+#[derive(Clone, Copy, Debug)]
+struct ShortBox {
+    min: [f32; 3],
+    max: [f32; 3],
+}
+
+impl ShortBox {
+    fn around(bounds: &Aabb<f64, 3>) -> Self {
+        let below = |x: f64| if f64::from(x as f32) > x { (x as f32).next_down() } else { x as f32 };
+        let above = |x: f64| if f64::from(x as f32) < x { (x as f32).next_up() } else { x as f32 };
+        let three = |point: &Point3<f64>, round: &dyn Fn(f64) -> f32| [0, 1, 2].map(|axis| round(point[axis]));
+        Self { min: three(&bounds.min, &below), max: three(&bounds.max, &above) }
+    }
+
+    #[inline]
+    fn bounds(&self) -> Aabb<f64, 3> {
+        Aabb { min: self.min.map(f64::from).into(), max: self.max.map(f64::from).into() }
+    }
+}
+
+/// Adds the nodes of a tree from number `at` on to `nodes`, each before those below it.
+fn shorten(tree: &[BvhNode<f64, 3>], at: usize, nodes: &mut Vec<Node>) -> Child {
+    match &tree[at] {
+        BvhNode::Leaf { shape_index, .. } => Child(Child::TRIANGLE | *shape_index as u32),
+        BvhNode::Node { child_l_index, child_l_aabb, child_r_index, child_r_aabb, .. } => {
+            let (number, boxes) = (nodes.len(), [child_l_aabb, child_r_aabb].map(ShortBox::around));
+            nodes.push(Node { boxes, children: [Child(0); 2] });
+            nodes[number].children = [*child_l_index, *child_r_index].map(|child| shorten(tree, child, nodes));
+            Child(number as u32)
+        }
+    }
 }
 
 /// The box of one triangle, for building the tree.
@@ -55,9 +114,17 @@ impl Index {
                 TriangleBox { bounds: Aabb::with_bounds(tight.min - slack, tight.max + slack), node: 0 }
             })
             .collect();
-        let nodes = Bvh::build(&mut boxes).nodes;
+        let mut nodes = Vec::with_capacity(boxes.len());
+        let root = shorten(&Bvh::build(&mut boxes).nodes, 0, &mut nodes);
         let bounds = boxes.iter().fold(Aabb::empty(), |bounds, one| bounds.join(&one.bounds));
-        Self { mesh, bounds, nodes }
+        Self { mesh, bounds, nodes, root }
+    }
+
+    /// The children of a node, with their boxes.
+    #[inline]
+    fn below(&self, node: Child) -> [(Aabb<f64, 3>, Child); 2] {
+        let Node { boxes, children } = &self.nodes[node.0 as usize];
+        [(boxes[0].bounds(), children[0]), (boxes[1].bounds(), children[1])]
     }
 
     pub(super) fn mesh(&self) -> &Mesh {
@@ -75,7 +142,7 @@ impl Index {
         if enter > until {
             return Outlook::ClearUntil(enter);
         }
-        search.visit(0);
+        search.visit(self.root);
         match search.element {
             Some(element) => Outlook::Hit { time: search.time, element },
             None if sweep.time(leave) <= until => Outlook::ClearUntil(f64::INFINITY),
@@ -86,59 +153,53 @@ impl Index {
     /// The triangle nearest to `point` and its distance, if that is at most `within` (m). Of equal ones, the lowest.
     pub(super) fn nearest(&self, point: &Vector3<f64>, within: f64) -> Option<(u32, f64)> {
         let mut best = (u32::MAX, within);
-        self.nearest_below(0, point, &mut best);
+        self.nearest_below(self.root, point, &mut best);
         (best.0 != u32::MAX).then_some(best)
     }
 
-    fn nearest_below(&self, node: usize, point: &Vector3<f64>, best: &mut (u32, f64)) {
-        match &self.nodes[node] {
-            BvhNode::Leaf { shape_index, .. } => {
-                let distance = (self.mesh.nearest(*shape_index, point) - point).norm();
-                let candidate = (*shape_index as u32, distance);
-                if distance < best.1 || distance == best.1 && candidate.0 < best.0 {
-                    *best = candidate;
-                }
+    fn nearest_below(&self, node: Child, point: &Vector3<f64>, best: &mut (u32, f64)) {
+        if let Some(triangle) = node.triangle() {
+            let distance = (self.mesh.nearest(triangle, point) - point).norm();
+            let candidate = (triangle as u32, distance);
+            if distance < best.1 || distance == best.1 && candidate.0 < best.0 {
+                *best = candidate;
             }
-            BvhNode::Node { child_l_index, child_l_aabb, child_r_index, child_r_aabb, .. } => {
-                let distance = |bounds: &Aabb<f64, 3>| bounds.min_distance_squared(Point3::from(*point)).sqrt();
-                let mut children = [(distance(child_l_aabb), *child_l_index), (distance(child_r_aabb), *child_r_index)];
-                if children[1].0 < children[0].0 {
-                    children.swap(0, 1);
-                }
-                for (distance, child) in children {
-                    if distance <= best.1 {
-                        self.nearest_below(child, point, best);
-                    }
-                }
+            return;
+        }
+        let mut children =
+            self.below(node).map(|(bounds, child)| (bounds.min_distance_squared(Point3::from(*point)).sqrt(), child));
+        if children[1].0 < children[0].0 {
+            children.swap(0, 1);
+        }
+        for (distance, child) in children {
+            if distance <= best.1 {
+                self.nearest_below(child, point, best);
             }
         }
     }
 
     /// Calls `visit` with every triangle nearer to `point` than `distance` (m), and its nearest point.
     pub(super) fn within(&self, point: &Vector3<f64>, distance: f64, visit: &mut impl FnMut(u32, Vector3<f64>)) {
-        self.within_below(0, point, distance, visit);
+        self.within_below(self.root, point, distance, visit);
     }
 
     fn within_below(
         &self,
-        node: usize,
+        node: Child,
         point: &Vector3<f64>,
         distance: f64,
         visit: &mut impl FnMut(u32, Vector3<f64>),
     ) {
-        match &self.nodes[node] {
-            BvhNode::Leaf { shape_index, .. } => {
-                let nearest = self.mesh.nearest(*shape_index, point);
-                if (nearest - point).norm_squared() < distance * distance {
-                    visit(*shape_index as u32, nearest);
-                }
+        if let Some(triangle) = node.triangle() {
+            let nearest = self.mesh.nearest(triangle, point);
+            if (nearest - point).norm_squared() < distance * distance {
+                visit(triangle as u32, nearest);
             }
-            BvhNode::Node { child_l_index, child_l_aabb, child_r_index, child_r_aabb, .. } => {
-                for (bounds, child) in [(child_l_aabb, *child_l_index), (child_r_aabb, *child_r_index)] {
-                    if bounds.min_distance_squared(Point3::from(*point)) < distance * distance {
-                        self.within_below(child, point, distance, visit);
-                    }
-                }
+            return;
+        }
+        for (bounds, child) in self.below(node) {
+            if bounds.min_distance_squared(Point3::from(*point)) < distance * distance {
+                self.within_below(child, point, distance, visit);
             }
         }
     }
@@ -152,25 +213,20 @@ impl Index {
         let directions = (1..100).map(|i| Vector3::new((f64::from(i) * 1.3).sin(), (f64::from(i) * 2.1).cos(), 0.37));
         directions
             .into_iter()
-            .find_map(|direction| self.crossings(0, point, &direction))
+            .find_map(|direction| self.crossings(self.root, point, &direction))
             .is_some_and(|count| count % 2 == 1)
     }
 
     /// How many triangles below `node` a ray crosses; `None` when it passes too close to an edge to tell.
-    fn crossings(&self, node: usize, point: &Vector3<f64>, direction: &Vector3<f64>) -> Option<usize> {
-        match &self.nodes[node] {
-            BvhNode::Leaf { shape_index, .. } => {
-                crossing(self.mesh.triangle(*shape_index), point, direction).map(usize::from)
-            }
-            BvhNode::Node { child_l_index, child_l_aabb, child_r_index, child_r_aabb, .. } => {
-                let inverse = direction.map(|component| 1.0 / component);
-                let below = |child: usize, bounds: &Aabb<f64, 3>| {
-                    let (enter, _) = passage(bounds, 0.0, point, &inverse);
-                    if enter.is_finite() { self.crossings(child, point, direction) } else { Some(0) }
-                };
-                Some(below(*child_l_index, child_l_aabb)? + below(*child_r_index, child_r_aabb)?)
-            }
+    fn crossings(&self, node: Child, point: &Vector3<f64>, direction: &Vector3<f64>) -> Option<usize> {
+        if let Some(triangle) = node.triangle() {
+            return crossing(self.mesh.triangle(triangle), point, direction).map(usize::from);
         }
+        let inverse = direction.map(|component| 1.0 / component);
+        self.below(node).into_iter().try_fold(0, |sum, (bounds, child)| {
+            let (enter, _) = passage(&bounds, 0.0, point, &inverse);
+            Some(sum + if enter.is_finite() { self.crossings(child, point, direction)? } else { 0 })
+        })
     }
 }
 
@@ -267,19 +323,16 @@ impl<'a> Search<'a> {
     }
 
     /// Tries everything below `node` that the sphere can touch before the first contact so far, what may come first first.
-    fn visit(&mut self, node: usize) {
-        match &self.index.nodes[node] {
-            BvhNode::Leaf { shape_index, .. } => self.try_triangle(*shape_index),
-            BvhNode::Node { child_l_index, child_l_aabb, child_r_index, child_r_aabb, .. } => {
-                let left = (self.earliest(child_l_aabb), *child_l_index, child_l_aabb);
-                let right = (self.earliest(child_r_aabb), *child_r_index, child_r_aabb);
-                let children = if right.0 < left.0 { [right, left] } else { [left, right] };
-                for (earliest, child, bounds) in children {
-                    let in_time = earliest.is_finite() && self.sweep.time(earliest) <= self.time;
-                    if in_time && !self.is_beyond(bounds) {
-                        self.visit(child);
-                    }
-                }
+    fn visit(&mut self, node: Child) {
+        if let Some(triangle) = node.triangle() {
+            return self.try_triangle(triangle);
+        }
+        let [left, right] = self.index.below(node).map(|(bounds, child)| (self.earliest(&bounds), child, bounds));
+        let children = if right.0 < left.0 { [right, left] } else { [left, right] };
+        for (earliest, child, bounds) in children {
+            let in_time = earliest.is_finite() && self.sweep.time(earliest) <= self.time;
+            if in_time && !self.is_beyond(&bounds) {
+                self.visit(child);
             }
         }
     }
