@@ -283,6 +283,8 @@ impl Buckets {
                 self.enter(owner);
             }
         }
+        // A crowd that is there from the start cannot be told apart by another layout.
+        self.part = (0, self.passed);
     }
 }
 
@@ -454,6 +456,19 @@ mod tests {
         assert_eq!(calendar.next(), None);
         calendar.schedule(3, event(1.0));
         assert_eq!(calendar.next(), Some((3, event(1.0))));
+    }
+
+    /// The buckets were laid out anew for each of thousands of events at one moment.
+    #[test]
+    fn a_crowd_at_one_moment_was_laid_out_for_each_of_its_events() {
+        let mut calendar = Buckets::default();
+        let event = |owner| Event { time: 1.0, kind: Kind::Grains, partner: owner };
+        (0..10_000).for_each(|owner| calendar.schedule(owner, event(owner)));
+        for owner in 0..10_000 {
+            assert_eq!(calendar.next(), Some((owner, event(owner))));
+            assert!(!calendar.is_crowded());
+            calendar.cancel(owner);
+        }
     }
 
     #[test]
