@@ -66,7 +66,7 @@ impl Lists {
             if flight.radius > 0.0 {
                 near.clear();
                 cells.add_around(grain as u32, &mut near);
-                near.each_once();
+                near.each_once(grain as u32);
                 lists.others.extend(near.iter().filter(|&(other, shift)| {
                     let theirs = &flights[other as usize];
                     let reach = flight.radius + theirs.radius + skin;

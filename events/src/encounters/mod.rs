@@ -69,7 +69,7 @@ impl Neighbors {
     /// Adds every grain that can soon touch `grain` to `near`, which is empty, once.
     fn add_each_once(&self, grain: u32, near: &mut Near) {
         self.add(grain, near);
-        near.each_once();
+        near.each_once(grain);
     }
 }
 

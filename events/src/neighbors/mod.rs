@@ -69,13 +69,13 @@ impl Near {
         here.chain(self.beyond.iter().copied())
     }
 
-    /// Leaves each of them only once, in the order of their numbers.
-    pub(crate) fn each_once(&mut self) {
+    /// Leaves each of them only once, and `id` not at all, in the order of their numbers.
+    pub(crate) fn each_once(&mut self, id: u32) {
         let here = &mut self.here[..self.count];
         here.sort_unstable();
         let mut count = 0;
         for at in 0..here.len() {
-            if count == 0 || here[count - 1] != here[at] {
+            if here[at] != id && (count == 0 || here[count - 1] != here[at]) {
                 here[count] = here[at];
                 count += 1;
             }
@@ -458,7 +458,7 @@ impl Cells {
     ///
     /// In which cells there are grains, and how many, cannot be foretold, and a wrong guess costs a processor as much as a look: so whole blocks are
     /// written down, and what does not count is overwritten. Grains of other cells that share a slot are among them, and now and then a grain is
-    /// twice: that costs a look, and changes nothing.
+    /// twice, or `id` is: that costs a look, and changes nothing.
     fn add<const AROUND: bool>(&self, id: u32, place: &Place, wanted: u32, near: &mut Near) {
         let offsets = &self.offsets[place.edges as usize];
         let mut occupied = 0;
@@ -568,6 +568,13 @@ mod tests {
 
     use super::*;
 
+    #[test]
+    fn each_once_is_each_once_and_without_oneself() {
+        let mut near = Near { count: 6, here: vec![3, 1, 2, 3, 2, 2, 1, 1], ..Near::default() };
+        near.each_once(2);
+        assert_eq!(near.iter().map(|(other, _)| other).collect::<Vec<_>>(), [1, 3]);
+    }
+
     /// Crowded and empty cells, in a period and without: whoever is near is found, and what stands beside an odd last one is a grain (it was the number of a
     /// block, and the search for partners went where no grain is).
     #[test]
@@ -600,7 +607,7 @@ mod tests {
                     near.clear();
                     cells.add_around(id, &mut near);
                     assert!(grains_only(&near), "round {round}, grain {id}");
-                    near.each_once();
+                    near.each_once(id);
                     let touching = |place: Vector3<f64>| place.norm() < 2.0 * radius;
                     let ours = flights[id as usize].position;
                     let mut found: Vec<u32> = near
