@@ -185,7 +185,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     }
 
     /// The numbers of all grains that are inside, in ascending order.
-    pub fn inside(&self) -> impl Iterator<Item = u32> + '_ {
+    pub fn inside(&self) -> impl Iterator<Item = u32> + Clone + '_ {
         (0..self.flights.len() as u32).filter(|&grain| !is_vacant(&self.flights[grain as usize]))
     }
 

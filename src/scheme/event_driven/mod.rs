@@ -46,7 +46,7 @@ pub const LARGEST_OVERLAP_WITH_FORCES: f64 = 1e-3;
 /// Speed over that of the fastest grain below which a sequence of hits has collapsed.
 const COLLAPSED: f64 = 1e-9;
 /// Where there are up to so many times as many ids as grains inside, each grain is put into the place of its id, which is faster than to sort them.
-const MOST_PLACES: usize = 4;
+const MOST_PLACES: u64 = 4;
 /// Grains that start in a cube of their own are neighbours in memory.
 const GRAINS_PER_CUBE: f64 = 8.0;
 /// The law of a contact in a collapse where no force acts.
@@ -541,7 +541,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
 
     /// Shows all grains at simulated time `time` (s), to which the run has been advanced.
     pub fn snapshot<R>(&self, time: f64, look: impl FnOnce(&Snapshot<'_>) -> R) -> R {
-        snapshot_of(time, self.encounters.inside().map(|slot| (self, slot)).collect(), look)
+        snapshot_of(time, self.encounters.inside().map(|slot| (self, slot)), look)
     }
 
     /// A grain at simulated time `time` (s), as a snapshot shows it.
@@ -579,9 +579,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
 }
 
 /// Shows the grains in these slots of engines at simulated time `time` (s), in the order of their ids.
-fn snapshot_of<S: Surface, C: Calendar, R>(
+fn snapshot_of<'a, S: Surface + 'a, C: Calendar + 'a, R>(
     time: f64,
-    slots: Vec<(&EventDriven<S, C>, u32)>,
+    slots: impl Iterator<Item = (&'a EventDriven<S, C>, u32)> + Clone,
     look: impl FnOnce(&Snapshot<'_>) -> R,
 ) -> R {
     let slots = in_order(slots, |&(engine, slot)| engine.grains[slot as usize].id);
@@ -591,14 +591,15 @@ fn snapshot_of<S: Surface, C: Calendar, R>(
 }
 
 /// Items in the order of their ids, all of which differ.
-fn in_order<T: Copy>(mut items: Vec<T>, id: impl Fn(&T) -> u64) -> Vec<T> {
-    let places = items.iter().map(&id).max().map_or(0, |last| last as usize + 1);
-    if places > MOST_PLACES * items.len() {
+fn in_order<T: Copy>(items: impl Iterator<Item = T> + Clone, id: impl Fn(&T) -> u64) -> Vec<T> {
+    let (count, places) = items.clone().fold((0, 0), |(count, places), item| (count + 1, id(&item).max(places)));
+    if places >= MOST_PLACES * count {
+        let mut items: Vec<T> = items.collect();
         items.sort_unstable_by_key(id);
         return items;
     }
-    let mut by_id = vec![None; places];
-    items.iter().for_each(|item| by_id[id(item) as usize] = Some(*item));
+    let mut by_id = vec![None; places as usize + 1];
+    items.for_each(|item| by_id[id(&item) as usize] = Some(item));
     by_id.into_iter().flatten().collect()
 }
 
@@ -648,8 +649,8 @@ mod tests {
         for step in [1, 3, 1_000_000_000_000] {
             let shuffled: Vec<u64> = (0..101).map(|number| number * 37 % 101 * step).collect();
             let sorted: Vec<u64> = (0..101).map(|number| number * step).collect();
-            assert_eq!(in_order(shuffled, |&id| id), sorted, "step {step}");
+            assert_eq!(in_order(shuffled.into_iter(), |&id| id), sorted, "step {step}");
         }
-        assert!(in_order(Vec::new(), |&id| id).is_empty());
+        assert!(in_order([].into_iter(), |&id| id).is_empty());
     }
 }

@@ -414,7 +414,7 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
     }
 
     /// The grains inside, each in the half to which it belongs.
-    fn own(&self) -> impl Iterator<Item = (&EventDriven<S, C>, u32)> {
+    fn own(&self) -> impl Iterator<Item = (&EventDriven<S, C>, u32)> + Clone {
         (0..).zip(&self.sharing.owner).filter_map(|(grain, &owner)| {
             let engine = &self.halves[usize::from(owner)].engine;
             engine.encounters.is_inside(grain).then_some((engine, grain))
@@ -423,7 +423,7 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
 
     /// Shows all grains at simulated time `time` (s), to which the run has been advanced.
     pub fn snapshot<R>(&self, time: f64, look: impl FnOnce(&Snapshot<'_>) -> R) -> R {
-        snapshot_of(time, self.own().collect(), look)
+        snapshot_of(time, self.own(), look)
     }
 }
 
