@@ -187,9 +187,10 @@ impl Slots {
     /// Asks the memory for the slots about a cell.
     #[inline]
     pub(super) fn fetch(&self, number: u32) {
-        let first = self.first(number);
-        prefetch(&self.occupied, first);
-        prefetch(&self.blocks, first);
+        prefetch(&self.occupied, self.first(number));
+        // Three blocks may lie in two cache lines.
+        prefetch(&self.blocks, self.first(number.wrapping_sub(1)));
+        prefetch(&self.blocks, self.first(number.wrapping_add(1)));
     }
 
     /// The grains in the first block of a cell and whether the slots about it are occupied; nothing where there is no such cell.
