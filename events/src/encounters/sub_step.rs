@@ -24,7 +24,7 @@ impl<'a> Vicinity<'a> {
         self.touches
     }
 
-    /// Calls `visit` with every grain that can soon touch `grain`, and perhaps with itself and with some that cannot, and the shift (m) of the
+    /// Calls `visit` with every grain that can soon touch `grain`, and perhaps with some that cannot, and the shift (m) of the
     /// image that is meant.
     pub fn around(&mut self, grain: u32, mut visit: impl FnMut(u32, Vector3<f64>)) {
         self.near.clear();

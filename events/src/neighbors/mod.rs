@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 use wide::{f64x4, u32x4};
 
 use self::layout::{FEWEST_PERIODIC_CELLS, Layout, contact_width};
-use self::slots::{Block, Slots};
+use self::slots::{Block, Slots, TURNED};
 use crate::prefetch::prefetch;
 use crate::{Domain, Flight};
 
@@ -27,8 +27,6 @@ const FEWEST_GRAINS: usize = 16;
 const WORTH_A_NEW_LAYOUT: f64 = 0.9;
 /// No grain. One bit is left beside the number of a grain, for [`TURNED`].
 const NOBODY: u32 = u32::MAX >> 1;
-/// A grain whose cell, as its stored position sees it, lies beyond the period: it cannot be looked at without a shift.
-const TURNED: u32 = 1 << 31;
 
 /// Smallest side (m) that a periodic domain may have for grains of this radius (m): eight radii and a little, or the image that a
 /// grain meets would not be clear.
@@ -489,6 +487,7 @@ impl Cells {
         occupied: u32,
         near: &mut Near,
     ) -> bool {
+        // A full block of each of the 27 cells, and what is written beside the last grain.
         near.make_room(Block::ROOM * 28);
         let (here, mut count, mut seen) = (&mut near.here[..], 0, u32x4::ZERO);
         let mut cells = occupied & !OWN;

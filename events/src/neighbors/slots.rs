@@ -1,6 +1,5 @@
 //! The table of cells: hashed, so that memory follows the grains and not the domain; in a period, where cells are few enough, one slot a cell.
 
-use super::TURNED;
 use crate::prefetch::prefetch;
 
 /// Slots for each grain, at least; cells are no smaller than to have one each.
@@ -10,6 +9,8 @@ const SPARSE: usize = 4;
 const MOST_SPARSE: usize = 1 << 17;
 /// Fewest slots.
 const FEWEST: usize = 64;
+/// A grain whose cell, as its stored position sees it, lies beyond the period: it cannot be looked at without a shift.
+pub(super) const TURNED: u32 = 1 << 31;
 
 /// How many slots so many grains get.
 pub(super) fn slots(grains: usize) -> usize {
