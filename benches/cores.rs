@@ -4,15 +4,12 @@
 
 mod support;
 
-use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use impinge::law::{ContactLaw, Friction};
-use impinge::scene::{Interference, Scene};
-use impinge::scheme::{Collapse, EventDriven, Halves, Laws};
-use impinge::surface::Surface;
-use impinge::{simulation, source};
+use impinge::scheme::{Collapse, EventDriven, Halves};
+use impinge_events::{NoSurface, Surface};
+use support::scenes::{Gas, JET_RESTITUTION, JET_UNTIL, gas, plane, smooth, wide_jet};
 use support::{Duel, advance, duel_by, trial};
 
 /// Unit cells along the sides of gases (four grains each), and grains of jets.
@@ -22,49 +19,8 @@ const JETS: [u32; 3] = [8_000, 100_000, 1_000_000];
 const MELTING: f64 = 4.0;
 const ROUNDS: u32 = 5;
 
-fn engine(scene: &Scene, restitution: f64) -> EventDriven<Surface> {
-    let law = ContactLaw { restitution, friction: Friction::Smooth };
-    let laws = Laws { grain: law, surface: law, interference: Interference::All, collapse: Collapse::Elastic };
-    let grains = source::place(scene, ".".as_ref(), &|_, _| None).expect("grains").grains;
-    let surface = Surface::new(&scene.surface, ".".as_ref()).expect("a surface");
-    EventDriven::new(&grains, surface, simulation::domain(scene), laws, 0.0)
-}
-
-/// Four grains in each of `cells`³ unit cells of 1 m, of thermal speed 1 m/s, and the time in which each collides once (Enskog).
-fn gas(cells: u32, fraction: f64) -> (EventDriven<Surface>, f64) {
-    let radius = (fraction * 3.0 / (16.0 * PI)).cbrt();
-    let chi = (1.0 - fraction / 2.0) / (1.0 - fraction).powi(3);
-    let text = format!(
-        r#"
-        run.until = 1.0
-        domain = {{ min = [0, 0, 0], max = [{cells}, {cells}, {cells}], boundary = "periodic" }}
-        grain = {{ radius = {radius}, density = 1000.0 }}
-        source = [{{ kind = "lattice", arrangement = "face-centred", cells = [{cells}, {cells}, {cells}], min = [0, 0, 0],
-            max = [{cells}, {cells}, {cells}], velocity = [0, 0, 0], thermal_speed = 1.0 }}]
-        "#
-    );
-    let time = PI.sqrt() * 2.0 * radius / (24.0 * fraction * chi);
-    (engine(&toml::from_str(&text).expect("a scene"), 1.0), time)
-}
-
-/// A jet as dense and as long as the reference jet of 8000 grains, onto a plane; it ends at 0.06 s.
-fn jet(count: u32) -> EventDriven<Surface> {
-    let half = 0.1 * (f64::from(count) / 8000.0).sqrt();
-    let text = format!(
-        r#"
-        run.until = 0.06
-        domain = {{ min = [-100, -100, -1], max = [100, 100, 100] }}
-        grain = {{ radius = 0.01, density = 8500.0 }}
-        source = [{{ kind = "block", min = [-{half}, -{half}, 0.1], max = [{half}, {half}, 2.6], count = {count},
-            velocity = [0, 0, -80] }}]
-        surface = [{{ kind = "plane", point = [0, 0, 0], normal = [0, 0, 1] }}]
-        "#
-    );
-    engine(&toml::from_str(&text).expect("a scene"), 0.8)
-}
-
 /// Both from copies of `start`, a part of the way after the other.
-fn race(start: &EventDriven<Surface>, part: f64, rounds: u32) -> Duel {
+fn race<S: Surface + Clone + Send + Sync>(start: &EventDriven<S>, part: f64, rounds: u32) -> Duel {
     let (mut one, mut two) = (start.clone(), Halves::of(start.clone()));
     let clock = Instant::now();
     let duel = duel_by(
@@ -105,13 +61,16 @@ fn race_all() {
     };
     for cells in GASES.into_iter().filter(|&cells| within(4.0 * f64::from(cells).powi(3))) {
         for fraction in [0.1, 0.4] {
-            let (mut start, time) = gas(cells, fraction);
+            let Gas { grains, domain, time } = gas(cells, fraction);
+            let mut start = EventDriven::new(&grains, NoSurface, domain, smooth(1.0, Collapse::Elastic), 0.0);
             advance(&mut start, MELTING * time);
             let name = format!("gas of {} grains, fraction {fraction}", 4 * cells.pow(3));
             line(name, race(&start, if trial() { 0.1 } else { 2.0 } * time, rounds));
         }
     }
     for count in JETS.into_iter().filter(|&count| within(f64::from(count))) {
-        line(format!("jet of {count} grains"), race(&jet(count), if trial() { 0.002 } else { 0.06 }, 1));
+        let (grains, domain) = wide_jet(count);
+        let start = EventDriven::new(&grains, plane(), domain, smooth(JET_RESTITUTION, Collapse::Elastic), 0.0);
+        line(format!("jet of {count} grains"), race(&start, if trial() { 0.002 } else { JET_UNTIL }, 1));
     }
 }

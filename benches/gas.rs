@@ -5,21 +5,14 @@
 
 mod support;
 
-use std::f64::consts::PI;
 use std::time::{Duration, Instant};
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use impinge::grains::NewGrain;
-use impinge::law::{ContactLaw, Friction};
-use impinge::scene::{Interference, Scene};
-use impinge::scheme::{Collapse, EventDriven, Laws};
-use impinge::{simulation, source};
+use impinge::scheme::{Collapse, EventDriven};
+use impinge_events::NoSurface;
 use impinge_events::calendar::{Buckets, Calendar, PlainCalendar};
-use impinge_events::{Domain, NoSurface};
-use support::{Duel, advance, duel, trial};
+use support::{Duel, advance, duel, scenes, trial};
 
-/// Standard deviation of each component of the velocity, m/s. The unit cell of the lattice is 1 m.
-const THERMAL_SPEED: f64 = 1.0;
 /// Collisions a grain from the lattice to the gas.
 const MELTING: f64 = 20.0;
 const ROUNDS: u32 = 11;
@@ -27,22 +20,21 @@ const ROUNDS: u32 = 11;
 /// A gas and how often its grains collide.
 struct Gas<C: Calendar> {
     engine: EventDriven<NoSurface, C>,
-    /// Collisions per second of simulated time.
-    rate: f64,
+    /// In which each grain collides once, s.
+    time: f64,
     grains: usize,
 }
 
 impl<C: Calendar> Gas<C> {
-    fn new(grains: &[NewGrain], domain: Domain, fraction: f64) -> Self {
-        let law = ContactLaw { restitution: 1.0, friction: Friction::Smooth };
-        let laws = Laws { grain: law, surface: law, interference: Interference::All, collapse: Collapse::None };
-        let engine = EventDriven::new(grains, NoSurface, domain, laws, 0.0);
-        Self { engine, rate: rate(grains, fraction), grains: grains.len() }
+    fn new(gas: &scenes::Gas) -> Self {
+        let laws = scenes::smooth(1.0, Collapse::None);
+        let engine = EventDriven::new(&gas.grains, NoSurface, gas.domain, laws, 0.0);
+        Self { engine, time: gas.time, grains: gas.grains.len() }
     }
 
     /// Goes on for about this many collisions and gives how many there were.
     fn collide(&mut self, collisions: f64) -> u64 {
-        let until = self.engine.time() + collisions / self.rate;
+        let until = self.engine.time() + 2.0 * collisions / self.grains as f64 * self.time;
         advance(&mut self.engine, until)
     }
 
@@ -60,48 +52,16 @@ impl<C: Calendar> Gas<C> {
     }
 }
 
-/// Collisions per second between grains: Carnahan & Starling (1969) with Enskog's theory, N w / 2 with
-/// w = 24 phi chi / √π × thermal speed / diameter.
-fn rate(grains: &[NewGrain], fraction: f64) -> f64 {
-    let chi = (1.0 - fraction / 2.0) / (1.0 - fraction).powi(3);
-    let each = 24.0 * fraction * chi / PI.sqrt() * THERMAL_SPEED / (2.0 * grains[0].radius);
-    grains.len() as f64 * each / 2.0
-}
-
-/// Four grains in each of `cells`³ unit cells of 1 m.
-fn lattice(cells: u32, fraction: f64) -> Scene {
-    let radius = (fraction * 3.0 / (16.0 * PI)).cbrt();
-    let box_ = format!("min = [0, 0, 0], max = [{cells}, {cells}, {cells}]");
-    toml::from_str(&format!(
-        r#"
-        run.until = 1.0
-        domain = {{ {box_}, boundary = "periodic" }}
-        grain = {{ radius = {radius}, density = 1000.0 }}
-        [[source]]
-        kind = "lattice"
-        arrangement = "face-centred"
-        cells = [{cells}, {cells}, {cells}]
-        min = [0, 0, 0]
-        max = [{cells}, {cells}, {cells}]
-        velocity = [0, 0, 0]
-        thermal_speed = {THERMAL_SPEED}
-        "#
-    ))
-    .expect("a scene")
-}
-
 fn melted(cells: u32, fraction: f64) -> (Gas<Buckets>, Gas<PlainCalendar>) {
-    let scene = lattice(cells, fraction);
-    let domain = simulation::domain(&scene);
-    let mut grains = source::place(&scene, ".".as_ref(), &|_, _| None).expect("a lattice").grains;
-    let mut fast = Gas::<Buckets>::new(&grains, domain, fraction);
-    fast.collide(MELTING / 2.0 * grains.len() as f64);
+    let mut gas = scenes::gas(cells, fraction);
+    let mut fast = Gas::<Buckets>::new(&gas);
+    fast.collide(MELTING / 2.0 * gas.grains.len() as f64);
     fast.engine.snapshot(fast.engine.time(), |snapshot| {
-        for (grain, flight) in grains.iter_mut().zip(snapshot.flights) {
+        for (grain, flight) in gas.grains.iter_mut().zip(snapshot.flights) {
             (grain.position, grain.velocity) = (flight.position, flight.velocity);
         }
     });
-    (Gas::new(&grains, domain, fraction), Gas::new(&grains, domain, fraction))
+    (Gas::new(&gas), Gas::new(&gas))
 }
 
 fn gas(c: &mut Criterion) {

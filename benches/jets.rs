@@ -7,41 +7,15 @@ mod support;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use impinge::grains::NewGrain;
-use impinge::law::{ContactLaw, Friction};
-use impinge::scene::{self, Interference, PlaneSurface, RectangleSurface, Scene};
-use impinge::scheme::{Collapse, EventDriven, Laws};
-use impinge::source;
+use impinge::scene::{self, RectangleSurface};
+use impinge::scheme::{Collapse, EventDriven};
 use impinge::surface::Surface;
 use impinge_events::calendar::{Buckets, Calendar, PlainCalendar};
 use impinge_events::{Domain, Flight, Outlook, SurfaceContact};
+use support::scenes::{JET_RESTITUTION, JET_UNTIL, plane, reference_jet, smooth, surface};
 use support::{Duel, advance, duel, trial};
 
-/// End of the run, s.
-const UNTIL: f64 = 0.06;
 const ROUNDS: u32 = 5;
-
-/// The grains of a reference jet.
-fn jet(count: u32) -> Vec<NewGrain> {
-    let text = format!(
-        r#"
-        run.until = {UNTIL}
-        domain = {{ min = [-10, -10, -1], max = [10, 10, 10] }}
-        grain = {{ radius = 0.01, density = 8500.0 }}
-        source = [{{ kind = "file", path = "tests/data/jet_{count}.csv" }}]
-        "#
-    );
-    let scene: Scene = toml::from_str(&text).expect("a scene");
-    let folder = env!("CARGO_MANIFEST_DIR").as_ref();
-    let mut grains = source::place(&scene, folder, &|_, _| None).expect("a reference jet").grains;
-    if trial() {
-        grains.truncate(200);
-    }
-    grains
-}
-
-fn plane() -> Surface {
-    surface(scene::Surface::Plane(PlaneSurface { point: [0.0; 3], normal: [0.0, 0.0, 1.0], velocity: [0.0; 3] }))
-}
 
 /// 2 × 224² = 100 352 triangles in the plane z = 0, each about as large as a grain. What lies further than 1 m from the middle is hit by
 /// few grains.
@@ -55,10 +29,6 @@ fn mesh() -> Surface {
         divisions: [parts; 2],
         velocity: [0.0; 3],
     }))
-}
-
-fn surface(surface: scene::Surface) -> Surface {
-    Surface::new(&[surface], ".".as_ref()).expect("a surface")
 }
 
 /// A surface at rest that all runs share: to copy a mesh for each of them would take longer than to run on it.
@@ -82,10 +52,9 @@ impl impinge_events::Surface for Shared<'_> {
 
 /// A whole run, from the placed grains to the end; gives the number of grain–grain collisions.
 fn run<C: Calendar>(grains: &[NewGrain], surface: &Surface) -> u64 {
-    let law = ContactLaw { restitution: 0.8, friction: Friction::Smooth };
-    let laws = Laws { grain: law, surface: law, interference: Interference::All, collapse: Collapse::Elastic };
+    let laws = smooth(JET_RESTITUTION, Collapse::Elastic);
     let mut engine: EventDriven<_, C> = EventDriven::new(grains, Shared(surface), Domain::unbounded(), laws, 0.0);
-    advance(&mut engine, UNTIL)
+    advance(&mut engine, JET_UNTIL)
 }
 
 fn jets(c: &mut Criterion) {
@@ -94,7 +63,10 @@ fn jets(c: &mut Criterion) {
     let rounds = if trial() { 1 } else { ROUNDS };
     let mut table = Vec::new();
     for count in [2000, 8000] {
-        let grains = jet(count);
+        let mut grains = reference_jet(count);
+        if trial() {
+            grains.truncate(200);
+        }
         let fast = || run::<Buckets>(&grains, &plane);
         let plain = || run::<PlainCalendar>(&grains, &plane);
         c.bench_function(&format!("jet of {count}/fast"), |b| b.iter(fast));

@@ -3,6 +3,9 @@
 // Each bench is a crate of its own and uses its share of this one.
 #![allow(dead_code, unreachable_pub)]
 
+pub mod scenes;
+pub mod valgrind;
+
 use std::ops::ControlFlow;
 use std::time::Duration;
 
@@ -81,7 +84,7 @@ pub fn duel_by(
     Duel { microseconds: times.map(median), ratio: median(ratios), collisions: collisions[0] }
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
+pub fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values[values.len() / 2]
 }
