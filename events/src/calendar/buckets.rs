@@ -344,7 +344,7 @@ impl Calendar for Buckets {
 
     fn coming(&mut self, owners: &mut Vec<u32>) {
         let buckets = self.buckets();
-        let last = (self.now + ANNOUNCED).min(self.turn + buckets - 1);
+        let last = self.now.saturating_add(ANNOUNCED).min(self.turn + (buckets - 1));
         self.announced = self.announced.max(self.now);
         while self.announced < last {
             self.announced += 1;
@@ -440,6 +440,22 @@ mod tests {
                 schedule(&mut fast, &mut plain, owner, time + pause);
             }
         }
+    }
+
+    /// What comes beyond the last bucket that has a number is in the last one; to look ahead of that overflowed (seen without optimisation).
+    #[test]
+    fn an_event_beyond_all_buckets_comes_last() {
+        let mut calendar = Buckets::default();
+        let times = [0.0, 1e-30, 1e10];
+        for (owner, time) in (0..).zip(times) {
+            calendar.schedule(owner, Event { time, kind: Kind::Grains, partner: 0 });
+        }
+        for (owner, time) in (0..).zip(times) {
+            assert_eq!(calendar.next().map(|(owner, event)| (owner, event.time)), Some((owner, time)));
+            calendar.coming(&mut Vec::new());
+            calendar.cancel(owner);
+        }
+        assert_eq!(calendar.next(), None);
     }
 
     /// Events that had not come when the calendar was cleared came back, or were looked for without end, if none was scheduled after that.
