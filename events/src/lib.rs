@@ -48,6 +48,7 @@ pub use encounters::{Encounter, Encounters, Touch, Vicinity, YIELDING};
 pub use flight::{Bend, Flight};
 pub use mesh::{BadTriangle, Mesh};
 pub use neighbors::least_period;
+pub use prefetch::prefetch;
 pub use surface::{NoSurface, Outlook, Surface, SurfaceContact};
 
 /// The program in README.md runs too.

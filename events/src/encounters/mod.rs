@@ -204,6 +204,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     /// The next encounter at or before `end` (s, epoch time) and its time, or `None`. Its grains have been advanced to that time; the
     /// caller now resolves it and calls [`deflect`](Self::deflect) or [`remove`](Self::remove) for each of them.
     pub fn next_before(&mut self, end: f64) -> Option<(f64, Encounter)> {
+        self.ahead.meeting.clear();
         loop {
             let (owner, event) = self.calendar.next()?;
             if event.time > end {
@@ -238,6 +239,15 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
                 }
             }
         }
+    }
+
+    /// Grains that will soon meet something, as the latest [`next_before`](Self::next_before) learnt on the way; nobody where there are so few grains that they
+    /// fit the caches. For a caller who keeps more about each grain, and can [`prefetch`](crate::prefetch) it: a grain that is named may meet nothing
+    /// after all, and one that is not named may.
+    #[inline]
+    #[must_use]
+    pub fn soon(&self) -> &[u32] {
+        &self.ahead.meeting
     }
 
     /// Gives grains that have just met something their new velocities (m/s) and predicts what lies before them now.

@@ -2,23 +2,25 @@
 
 /// A caged grain, one that has hit at least three partners in a row of hits each within [`COLLAPSE_TIME`] of the one before, is part of a
 /// collapse after so many. In the reference jets (restitution 0.8) no grain ever is.
-const COLLAPSE_HITS: u32 = 16;
+const COLLAPSE_HITS: u16 = 16;
 /// A grain in a line, between no more than two partners, is so after this many hits in which its approach speed has not halved. Collapses in
 /// a line die out by themselves and have a closed form; it holds up to an outer grain some fifty times as heavy as the inner one.
-const COLLAPSE_HITS_IN_LINE: u32 = 64;
+const COLLAPSE_HITS_IN_LINE: u16 = 64;
 /// Part of an epoch (0.001 radii of flight of the fastest grain) within which hits are in a row.
 pub(super) const COLLAPSE_TIME: f64 = 1.0 / (1u64 << 22) as f64;
-/// Hits of one grain, each shortly after the one before.
+
+/// Hits of one grain, each shortly after the one before: in half a cache line.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(32))]
 pub(super) struct Row {
     /// Time of the latest hit, s (epoch time).
     latest: f64,
     /// Approach speed that is to be halved, m/s.
     speed: f64,
-    /// All hits.
-    hits: u32,
-    /// Those since the approach speed was halved.
-    not_halved: u32,
+    /// All hits, or very many.
+    hits: u16,
+    /// Those since the approach speed was halved, or very many.
+    not_halved: u16,
     /// The first two that were hit.
     partners: [u32; 2],
     /// Whether there was a third.

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use impinge_events::calendar::{Buckets, Calendar};
-use impinge_events::{Domain, Encounter, Encounters, Flight, Surface};
+use impinge_events::{Domain, Encounter, Encounters, Flight, Surface, prefetch};
 use nalgebra::Vector3;
 
 mod collapse;
@@ -227,7 +227,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             let epoch_end = self.epoch_start + self.epoch;
             // The end of the epoch as it is known to `encounters`, free of the rounding of `epoch_end`.
             let until = if end < epoch_end { end - self.epoch_start } else { self.epoch };
-            let Some((time, encounter)) = self.encounters.next_before(until) else {
+            let Some((time, encounter)) = self.next_before(until) else {
                 if end <= epoch_end || self.force.acts {
                     break;
                 }
@@ -255,6 +255,23 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         }
         self.time = end;
         Ok(watch(self.progress()))
+    }
+
+    /// The next encounter at or before `until` (s, epoch time). What its grains carry is asked for at once, not when each is needed, and what those carry
+    /// who come soon, ahead.
+    #[inline]
+    fn next_before(&mut self, until: f64) -> Option<(f64, Encounter)> {
+        let next = self.encounters.next_before(until)?;
+        let fetch = |grain: u32| {
+            prefetch(&self.grains, grain as usize);
+            prefetch(&self.rows, grain as usize);
+        };
+        match next.1 {
+            Encounter::Grains { a, b } => [a, b].map(fetch),
+            Encounter::Surface { grain, .. } | Encounter::Exit { grain } => [fetch(grain), ()],
+        };
+        self.encounters.soon().iter().copied().for_each(fetch);
+        Some(next)
     }
 
     #[inline]

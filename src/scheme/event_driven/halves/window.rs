@@ -22,7 +22,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     ) -> Result<(), Broken> {
         log.clear();
         self.encounters.forget_crossings();
-        while let Some((time, encounter)) = self.encounters.next_before(until) {
+        while let Some((time, encounter)) = self.next_before(until) {
             let grains = match encounter {
                 Encounter::Grains { a, b } => [a, b],
                 Encounter::Surface { grain, .. } | Encounter::Exit { grain } => [grain; 2],
