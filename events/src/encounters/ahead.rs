@@ -2,7 +2,7 @@
 //!
 //! Where there are so many grains that they do not fit the caches, to wait for memory is most of what a collision costs. The calendar knows
 //! whose turn it is soon; each of them goes through three stages, because where the later things are is only known once the earlier ones
-//! have come: its flight and its place, the cells around it, the grains in these cells. These are hints: they cannot change a bit.
+//! have come: its flight and its place, the cells around it, the flights and plans of the grains in these cells. These are hints: they cannot change a bit.
 
 use super::{Encounters, Neighbors};
 use crate::Surface;
@@ -72,7 +72,11 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             }
             let owner = self.ahead.before_last(2 * BETWEEN_STAGES);
             if let Some(region) = region(owner, self.calendar.plan(owner).first()) {
-                cells.visit_first_in_cells(region, |grain| prefetch(&self.flights, grain as usize));
+                cells.visit_first_in_cells(region, |grain| {
+                    prefetch(&self.flights, grain as usize);
+                    // A meeting with it counts only if it comes before what it has planned.
+                    self.calendar.fetch(grain);
+                });
             }
         }
         self.ahead.coming = coming;
