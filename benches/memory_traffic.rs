@@ -25,8 +25,8 @@ const RUNS: [(Run, usize); 5] = [
     (Run::Gas { cells: 29, percent: 10 }, 44 << 20),
     (Run::Gas { cells: 29, percent: 40 }, 44 << 20),
 ];
-/// The part of a run of a gas in which its lattice melts, and the part up to which it is counted (of twenty collisions a grain).
-const MELTING: f64 = 0.1;
+/// The part of a run of a gas that is left out, in which it begins to leave its lattice, and the part up to which it is counted (of twenty collisions a grain).
+const FROM: f64 = 0.1;
 const UNTIL: f64 = 0.25;
 /// The caches that are simulated: a first of 32 KB and a second of 1 MB, as cores of 2022 have (Zen 4).
 const CACHES: [&str; 5] =
@@ -93,7 +93,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         "a collision", "instructions", "32 KB", "1 MB", "chased", "known", "floor", "all"
     );
     for (number, (run, bytes)) in RUNS.into_iter().enumerate() {
-        let [from, until] = if matches!(run, Run::Jet { .. }) { [0.0, 1.0] } else { [MELTING, UNTIL] };
+        let [from, until] = if matches!(run, Run::Jet { .. }) { [0.0, 1.0] } else { [FROM, UNTIL] };
         let counted = |part| count(number, part, &CACHES, &LABELS);
         let (Some(long), Some(short)) = (counted(until)?, counted(from)?) else {
             eprintln!("no valgrind: nothing is counted");

@@ -244,6 +244,18 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     /// Grains that will soon meet something, as the latest [`next_before`](Self::next_before) learnt on the way; nobody where there are so few grains that they
     /// fit the caches. For a caller who keeps more about each grain, and can [`prefetch`](crate::prefetch) it: a grain that is named may meet nothing
     /// after all, and one that is not named may.
+    ///
+    /// ```
+    /// use impinge_events::{Domain, Encounters, Flight, NoSurface, prefetch};
+    /// # let ball = |x: f64, vx: f64| Flight { position: nalgebra::Vector3::new(x, 0.0, 0.0), time: 0.0, velocity: nalgebra::Vector3::new(vx, 0.0, 0.0), radius: 0.5 };
+    /// let (flights, masses) = (vec![ball(0.0, 1.0), ball(3.0, 0.0)], [1.0, 2.0]);
+    /// let mut balls = Encounters::<NoSurface>::new(flights, NoSurface, Domain::unbounded());
+    /// while let Some((_, encounter)) = balls.next_before(1.0) {
+    ///     balls.soon().iter().for_each(|&grain| prefetch(&masses, grain as usize));
+    ///     // ... what `encounter` does to velocities, by `masses`
+    /// #   unreachable!("{encounter:?}");
+    /// }
+    /// ```
     #[inline]
     #[must_use]
     pub fn soon(&self) -> &[u32] {
