@@ -3,6 +3,7 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
+use super::staging::Staging;
 use super::{Calendar, Event, Kind, NOBODY, Plan, never};
 use crate::prefetch::prefetch;
 
@@ -20,16 +21,23 @@ const NARROWEST: f64 = 1.0 / 64.0;
 const ANNOUNCED: i64 = 24;
 /// So many buckets before that the first owner in each is fetched from memory.
 const FETCHED: i64 = 8;
+/// From so many buckets on their lists do not fit the caches: an owner enters one that is at least so many ahead only after some others, once its first owner has
+/// come from memory.
+const MANY: usize = 1 << 17;
+const FAR: i64 = 64;
+const _: () = assert!(FAR / 2 > ANNOUNCED);
+/// Stands in place of the owner before one that is yet to enter its list.
+const STAGED: u32 = NOBODY - 1;
 
 /// A calendar in which an owner is rescheduled in a time that does not grow with the number of owners.
 ///
-/// Events that come later than the present bucket of time wait in lists without an order, one for each of the next buckets (a turn of them)
-/// and one for what comes after the turn. When a bucket becomes the present one its events go into a heap, and so do those that are
+/// Events that come later than the present bucket of time wait in lists without an order, one for each of the next buckets (a turn of them); those that come
+/// after the turn are in no list, and are looked for when the next one begins. When a bucket becomes the present one its events go into a heap, and so do those that are
 /// scheduled into it from then on. About one event is in a bucket, so the heap is all but empty. Should thousands come at once, it is a heap still.
 #[derive(Clone, Debug)]
 pub struct Buckets {
     owners: Vec<Owner>,
-    /// First owner in each of the lists: those of a turn, and last the one for later turns.
+    /// First owner in the list of each bucket of a turn.
     first: Vec<u32>,
     /// Events of the present bucket and all before it, and some that are no longer so.
     present: BinaryHeap<Entry>,
@@ -43,14 +51,18 @@ pub struct Buckets {
     rate: f64,
     /// Owners that wait in the lists of this turn.
     waiting: usize,
+    /// Owners that wait for later turns, in no list.
+    later: usize,
     /// Events that have come into the heap in this turn.
     passed: usize,
-    /// The same since the buckets were laid out, until this turn, and how many waited for later turns whenever one began.
+    /// The same since the buckets were laid out, until this turn, and how many owners there were whenever one began.
     passed_before: usize,
     /// The first bucket of the present part of a turn, and how many events had come by then.
     part: (i64, usize),
     /// The bucket up to which it was said who comes.
     announced: i64,
+    /// Owners that are yet to enter their lists.
+    staging: Staging,
 }
 
 /// All that belongs to an owner, in one cache line: what the calendar needs of it is then at hand for who asks for its plan.
@@ -112,17 +124,19 @@ impl Default for Buckets {
     fn default() -> Self {
         Self {
             owners: Vec::new(),
-            first: vec![NOBODY; 2],
+            first: vec![NOBODY; 1],
             present: BinaryHeap::new(),
             now: 0,
             turn: 0,
             origin: 0.0,
             rate: 0.0,
             waiting: 0,
+            later: 0,
             passed: 0,
             passed_before: 0,
             part: (0, 0),
             announced: 0,
+            staging: Staging::default(),
         }
     }
 }
@@ -131,7 +145,7 @@ impl Buckets {
     /// How many buckets are in a turn: a power of two.
     #[inline]
     fn buckets(&self) -> i64 {
-        self.first.len() as i64 - 1
+        self.first.len() as i64
     }
 
     /// The bucket of a time.
@@ -141,11 +155,16 @@ impl Buckets {
         ((time - self.origin) * self.rate) as i64
     }
 
-    /// The list of a bucket later than the present one.
+    /// The list of a bucket.
     #[inline]
     fn list(&self, bucket: i64) -> usize {
-        let buckets = self.buckets();
-        (if bucket - self.turn < buckets { bucket & (buckets - 1) } else { buckets }) as usize
+        (bucket & (self.buckets() - 1)) as usize
+    }
+
+    /// Whether a bucket comes in a later turn.
+    #[inline]
+    fn is_later(&self, bucket: i64) -> bool {
+        bucket - self.turn >= self.buckets()
     }
 
     /// Puts the event of `owner` where it belongs.
@@ -160,14 +179,40 @@ impl Buckets {
             self.passed += 1;
             return self.present.push(Entry { event, owner });
         }
+        if self.is_later(bucket) {
+            self.later += 1;
+            return;
+        }
         let list = self.list(bucket);
+        self.waiting += 1;
+        if self.first.len() < MANY || bucket - self.now < FAR {
+            return self.link(owner, list);
+        }
+        prefetch(&self.first, list);
+        self.owners[owner as usize].before = STAGED;
+        let longest = self.staging.enter(owner, bucket);
+        if longest != NOBODY {
+            self.link(longest, self.list(self.bucket(self.owners[longest as usize].event.time)));
+        }
+    }
+
+    /// Lets all owners that are yet to enter their lists do so.
+    #[cold]
+    fn link_staged(&mut self) {
+        for owner in self.staging.take() {
+            self.link(owner, self.list(self.bucket(self.owners[owner as usize].event.time)));
+        }
+    }
+
+    /// Puts `owner` at the head of a list.
+    #[inline]
+    fn link(&mut self, owner: u32, list: usize) {
         let after = std::mem::replace(&mut self.first[list], owner);
         let ours = &mut self.owners[owner as usize];
         (ours.before, ours.after) = (NOBODY, after);
         if after != NOBODY {
             self.owners[after as usize].before = owner;
         }
-        self.waiting += usize::from(list + 1 < self.first.len());
     }
 
     /// Takes the event of `owner` from where it is; the heap forgets it later.
@@ -181,31 +226,39 @@ impl Buckets {
         if bucket <= self.now {
             return;
         }
+        if self.is_later(bucket) {
+            self.later -= 1;
+            return;
+        }
+        self.waiting -= 1;
         let Owner { before, after, .. } = self.owners[owner as usize];
-        let list = self.list(bucket);
-        if before == NOBODY {
-            self.first[list] = after;
-        } else {
-            self.owners[before as usize].after = after;
+        match before {
+            STAGED => return self.staging.leave(owner),
+            NOBODY => {
+                let list = self.list(bucket);
+                self.first[list] = after;
+            }
+            _ => self.owners[before as usize].after = after,
         }
         if after != NOBODY {
             self.owners[after as usize].before = before;
         }
-        self.waiting -= usize::from(list + 1 < self.first.len());
     }
 
     /// Goes on to the next bucket that holds an event; tells whether there is one.
     fn go_on(&mut self) -> bool {
-        let later = self.first.len() - 1;
         while self.present.is_empty() {
             if self.waiting == 0 {
-                if self.first[later] == NOBODY {
+                if self.later == 0 {
                     return false;
                 }
                 self.start_turn();
                 continue;
             }
             self.now += 1;
+            if self.staging.earliest() - FAR / 2 < self.now {
+                self.link_staged();
+            }
             if self.now - self.part.0 == self.buckets() / PARTS_OF_TURN {
                 self.part = (self.now, self.passed);
             }
@@ -230,24 +283,20 @@ impl Buckets {
         if few && self.passed_before as i64 > self.buckets() {
             return self.lay_out();
         }
-        let mut next = i64::MAX;
-        let later = self.first.len() - 1;
-        let mut owner = self.first[later];
-        while owner != NOBODY {
-            self.passed_before += 1;
-            next = next.min(self.bucket(self.owners[owner as usize].event.time));
-            owner = self.owners[owner as usize].after;
-        }
+        // To look through all owners, which are side by side, is faster than to follow a list through all of the memory.
+        let waits = |&owner: &u32| {
+            let time = self.owners[owner as usize].event.time;
+            time < f64::INFINITY && self.is_later(self.bucket(time))
+        };
+        let later: Vec<u32> = (0..self.owners.len() as u32).filter(waits).collect();
+        let bucket = |&owner: &u32| self.bucket(self.owners[owner as usize].event.time);
+        let next = later.iter().map(bucket).min().unwrap_or(i64::MAX);
         self.turn = next & !(self.buckets() - 1);
         // The bucket before the next one: everybody is later.
         self.now = next.saturating_sub(1);
-        (self.passed, self.part) = (0, (self.now, 0));
-        owner = std::mem::replace(&mut self.first[later], NOBODY);
-        while owner != NOBODY {
-            let after = self.owners[owner as usize].after;
-            self.enter(owner);
-            owner = after;
-        }
+        self.passed_before += self.owners.len();
+        (self.passed, self.later, self.part) = (0, 0, (self.now, 0));
+        later.into_iter().for_each(|owner| self.enter(owner));
     }
 
     /// Whether so many events came lately that it pays to lay the buckets out anew.
@@ -274,10 +323,11 @@ impl Buckets {
         let lately = self.rate * (self.passed - self.part.1) as f64 / ((self.now - self.part.0) as f64 + 1.0);
         self.rate = lately.clamp(until_median, until_median / NARROWEST).min(f64::MAX);
         self.first.clear();
-        self.first.resize((BUCKETS_PER_EVENT * count).next_power_of_two() + 1, NOBODY);
+        self.first.resize((BUCKETS_PER_EVENT * count).next_power_of_two(), NOBODY);
         self.present.clear();
         (self.now, self.turn, self.announced) = (0, 0, 0);
-        (self.waiting, self.passed, self.passed_before, self.part) = (0, 0, 0, (0, 0));
+        (self.waiting, self.later, self.passed, self.passed_before, self.part) = (0, 0, 0, 0, (0, 0));
+        self.staging = Staging::default();
         for owner in 0..self.owners.len() as u32 {
             if self.owners[owner as usize].event.time < f64::INFINITY {
                 self.enter(owner);
@@ -338,7 +388,8 @@ impl Calendar for Buckets {
         self.first.fill(NOBODY);
         self.present.clear();
         (self.now, self.turn, self.announced) = (0, 0, 0);
-        (self.waiting, self.passed, self.passed_before, self.part) = (0, 0, 0, (0, 0));
+        (self.waiting, self.later, self.passed, self.passed_before, self.part) = (0, 0, 0, 0, (0, 0));
+        self.staging = Staging::default();
         self.rate = 0.0;
     }
 
@@ -472,6 +523,45 @@ mod tests {
         assert_eq!(calendar.next(), None);
         calendar.schedule(3, event(1.0));
         assert_eq!(calendar.next(), Some((3, event(1.0))));
+    }
+
+    /// So many owners that some are on their way into their lists when they are scheduled anew, cancelled, or their turn comes.
+    #[test]
+    fn many_buckets_equal_the_plain_calendar() {
+        let mut random = rand_pcg::Pcg64::seed_from_u64(3);
+        let owners = MANY as u32;
+        let (mut fast, mut plain) = (Buckets::default(), PlainCalendar::default());
+        let mut now = 0.0;
+        for step in 0..3 * owners {
+            // One after the other at first; then some again and again, and those that had the next event, which have few more.
+            let next = if step % 4 == 3 { fast.next().map(|(owner, _)| owner) } else { None };
+            let owner = match next {
+                _ if step < owners => step,
+                Some(owner) => owner,
+                None if step % 2 == 0 => random.random_range(0..owners),
+                None => random.random_range(0..32),
+            };
+            if step > owners && random.random_range(0..8) == 0 {
+                fast.cancel(owner);
+                plain.cancel(owner);
+            } else {
+                let later = if random.random_range(0..4) == 0 { 0.001 } else { 1.0 };
+                let event = Event { time: now + later * random.random::<f64>(), kind: Kind::Review, partner: 0 };
+                fast.schedule(owner, event);
+                plain.schedule(owner, event);
+            }
+            if step >= owners {
+                assert_eq!(fast.next(), plain.next(), "step {step}");
+                now = plain.next().map_or(now, |(_, event)| event.time);
+            }
+        }
+        assert!(fast.first.len() >= MANY);
+        while let Some((owner, event)) = plain.next() {
+            assert_eq!(fast.next(), Some((owner, event)));
+            fast.cancel(owner);
+            plain.cancel(owner);
+        }
+        assert_eq!(fast.next(), None);
     }
 
     /// The buckets were laid out anew for each of thousands of events at one moment.

@@ -7,6 +7,7 @@
 mod buckets;
 mod plain;
 mod plan;
+mod staging;
 
 pub use buckets::Buckets;
 pub use plain::PlainCalendar;

@@ -70,6 +70,9 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             if let Some(region) = region(owner, first) {
                 cells.fetch_cells(region);
             }
+            if first.kind == Kind::Crossing {
+                cells.fetch_old_and_new(owner, first.partner as u8);
+            }
             let owner = self.ahead.before_last(2 * BETWEEN_STAGES);
             if let Some(region) = region(owner, self.calendar.plan(owner).first()) {
                 cells.visit_first_in_cells(region, |grain| {

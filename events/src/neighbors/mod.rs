@@ -421,13 +421,22 @@ impl Cells {
         Some(Region { number: number.wrapping_add(self.layout.along(axis, step)), edges, wanted })
     }
 
+    /// Asks the memory for the cell of grain `id` and the one into which it goes through a `side`.
+    #[inline]
+    pub(crate) fn fetch_old_and_new(&self, id: u32, side: u8) {
+        let Some(place) = self.places.get(id as usize) else { return };
+        let (axis, step) = axis_and_step(side);
+        self.slots.fetch(place.number);
+        self.slots.fetch(place.number.wrapping_add(self.layout.along(axis, step)));
+    }
+
     /// Asks the memory for the cells of a region.
     #[inline]
     pub(crate) fn fetch_cells(&self, region: Region) {
         let offsets = &self.offsets[region.edges as usize];
         for row in 0..9 {
             if region.wanted & 0b111 << (3 * row) != 0 {
-                self.slots.fetch(region.number.wrapping_add(offsets[3 * row + 1]));
+                self.slots.fetch_three(region.number.wrapping_add(offsets[3 * row + 1]));
             }
         }
     }

@@ -185,9 +185,16 @@ impl Slots {
         self.occupied[self.first(number)]
     }
 
-    /// Asks the memory for the slots about a cell.
+    /// Asks the memory for the slot of a cell.
     #[inline]
     pub(super) fn fetch(&self, number: u32) {
+        prefetch(&self.occupied, self.first(number));
+        prefetch(&self.blocks, self.first(number));
+    }
+
+    /// Asks the memory for the slots before, of and after that of a cell.
+    #[inline]
+    pub(super) fn fetch_three(&self, number: u32) {
         prefetch(&self.occupied, self.first(number));
         // Three blocks may lie in two cache lines.
         prefetch(&self.blocks, self.first(number.wrapping_sub(1)));
