@@ -61,6 +61,8 @@ pub struct Buckets {
     part: (i64, usize),
     /// The bucket up to which it was said who comes.
     announced: i64,
+    /// Those that come after the ones that were named last, in the same lists.
+    following: Vec<u32>,
     /// Owners that are yet to enter their lists.
     staging: Staging,
 }
@@ -136,6 +138,7 @@ impl Default for Buckets {
             passed_before: 0,
             part: (0, 0),
             announced: 0,
+            following: Vec::new(),
             staging: Staging::default(),
         }
     }
@@ -397,14 +400,22 @@ impl Calendar for Buckets {
         let buckets = self.buckets();
         let last = self.now.saturating_add(ANNOUNCED).min(self.turn + (buckets - 1));
         self.announced = self.announced.max(self.now);
+        owners.append(&mut self.following);
         while self.announced < last {
             self.announced += 1;
             let list = |bucket: i64| (bucket & (buckets - 1)) as usize;
             self.fetch(self.first[list(self.announced + FETCHED)]);
-            let mut owner = self.first[list(self.announced)];
-            while owner != NOBODY {
-                owners.push(owner);
-                owner = self.owners[owner as usize].after;
+            let first = self.first[list(self.announced)];
+            if first != NOBODY {
+                owners.push(first);
+            }
+        }
+        // To go through whole lists at once would be to wait for each of their owners.
+        for &owner in owners.iter() {
+            let after = self.owners[owner as usize].after;
+            if after != NOBODY {
+                self.fetch(after);
+                self.following.push(after);
             }
         }
     }
