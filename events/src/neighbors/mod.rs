@@ -179,6 +179,29 @@ const BEYOND: [u32; 27] = {
     beyond
 };
 
+/// For each kind of edge and each of the 27 cells around a cell: at which ends of the period one leaves it on the way there, as the number of that of these
+/// cells to which one would step there.
+const LEAVES: [[u8; 27]; 27] = {
+    let mut leaves = [[INSIDE; 27]; 27];
+    let mut edges = 0;
+    while edges < 27 {
+        let mut number = 0;
+        while number < 27 {
+            let mut axis = 0;
+            while axis < 3 {
+                let step = steps(number)[axis];
+                if step == steps(edges)[axis] {
+                    leaves[edges][number] = (leaves[edges][number] as i32 + step * THREE_TO[axis] as i32) as u8;
+                }
+                axis += 1;
+            }
+            number += 1;
+        }
+        edges += 1;
+    }
+    leaves
+};
+
 /// The steps along each axis that lead to one of the 27 cells around a cell and itself.
 const fn steps(number: usize) -> [i32; 3] {
     let number = number as i32;
@@ -200,6 +223,8 @@ pub(crate) struct Cells {
     places: Vec<Place>,
     /// What the 27 cells around a cell add to its number (and nothing more, to fill up), for each kind of edge.
     offsets: Box<[[u32; 32]; 27]>,
+    /// What brings grains at the other end of a period to where their images are (m), for all ends that one may leave it at.
+    shifts: [Vector3<f64>; 27],
 }
 
 impl Cells {
@@ -228,7 +253,9 @@ impl Cells {
         let beside = if domain.planar { AHEAD[2] | AHEAD[3] } else { 0 };
         let around = ((1 << 27) - 1) & !beside;
         let slots = Slots::new(layout.cells(), grains);
-        Self { layout, domain, made_for: grains, everywhere, around, slots, places: Vec::new(), offsets }
+        let shifts =
+            std::array::from_fn(|ends| Vector3::from(steps(ends)).map(f64::from).component_mul(&layout.extent));
+        Self { layout, domain, made_for: grains, everywhere, around, slots, places: Vec::new(), offsets, shifts }
     }
 
     /// An empty grid that suits `flights` better, if it is worth its cost; `crossings` and `looks` are what this one took lately.
@@ -548,14 +575,19 @@ impl Cells {
 
     /// Adds the grains in those cells around a place whose bits are set, but for `id`, with their shifts. There may be none in some of these cells.
     fn add_beyond(&self, id: u32, place: &Place, mut wanted: u32, near: &mut Near) {
-        let offsets = &self.offsets[place.edges as usize];
+        let (offsets, leaves) = (&self.offsets[place.edges as usize], &LEAVES[place.edges as usize]);
         while wanted != 0 {
             let around = wanted.trailing_zeros() as usize;
             wanted &= wanted - 1;
             let first = self.slots.first_block(place.number.wrapping_add(offsets[around]));
             for block in std::iter::successors(Some(first), |block| self.slots.next_block(block)) {
+                let stored_there = !place.turned && block.turned() == 0;
                 for other in block.grains().filter(|&other| other != id) {
-                    near.beyond.push((other, self.shift(other, place.cell, around)));
+                    let shift = match stored_there {
+                        true => self.shifts[leaves[around] as usize],
+                        false => self.shift(other, place.cell, around),
+                    };
+                    near.beyond.push((other, shift));
                 }
             }
         }
