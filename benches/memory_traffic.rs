@@ -25,9 +25,9 @@ const RUNS: [(Run, usize); 5] = [
     (Run::Gas { cells: 29, percent: 10 }, 44 << 20),
     (Run::Gas { cells: 29, percent: 40 }, 44 << 20),
 ];
-/// The part of a run of a gas that is left out, in which it begins to leave its lattice, and the part up to which it is counted (of twenty collisions a grain).
-const FROM: f64 = 0.1;
-const UNTIL: f64 = 0.25;
+/// The part of a run of a gas that is left out, in which its lattice melts, and the part up to which it is counted (of twenty collisions a grain).
+const FROM: f64 = 0.2;
+const UNTIL: f64 = 0.35;
 /// The caches that are simulated: a first of 32 KB and a second of 1 MB, as cores of 2022 have (Zen 4).
 const CACHES: [&str; 5] =
     ["--tool=cachegrind", "--cache-sim=yes", "--cachegrind-out-file=/dev/null", "--D1=32768,8,64", "--LL=1048576,8,64"];

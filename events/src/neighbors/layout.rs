@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::slots::slots;
+use super::slots::{cells_of_period, slots};
 use crate::{Domain, Flight};
 
 /// A cell is wider than the largest contact distance by this fraction, so that a crossing that is late by rounding cannot
@@ -79,7 +79,8 @@ impl Layout {
         }
         let volume: f64 = axes.iter().map(|&axis| extent[axis]).product();
         let grains = if domain.periodic { flights.len().max(everywhere) } else { flights.len() };
-        let one_in_each_slot = (volume / slots(grains) as f64).powf(1.0 / axes.len() as f64);
+        let cells = if domain.periodic { cells_of_period(grains) } else { slots(grains) };
+        let one_in_each_slot = (volume / cells as f64).powf(1.0 / axes.len() as f64);
         let reach = |flight: &Flight| (flight.position_at(now) - corner - drift * now).amax();
         let farthest = flights.iter().map(reach).fold(0.0, f64::max);
         let width = contact.max(width.unwrap_or(one_in_each_slot)).max(farthest / FARTHEST_CELL);

@@ -7,6 +7,8 @@ const SLOTS_PER_GRAIN: usize = 4;
 /// A hashed table has so many times as many, so that few strangers share a slot, where there are no more grains than these: beyond, memory counts more.
 const SPARSE: usize = 4;
 const MOST_SPARSE: usize = 1 << 17;
+/// Into so many cells for each grain a period is cut beyond that number: half as many, which costs nothing where most of the time is spent waiting for memory.
+const CELLS_PER_GRAIN: usize = 2;
 /// Fewest slots.
 const FEWEST: usize = 64;
 /// A grain whose cell, as its stored position sees it, lies beyond the period: it cannot be looked at without a shift.
@@ -15,6 +17,11 @@ pub(super) const TURNED: u32 = 1 << 31;
 /// How many slots so many grains get.
 pub(super) fn slots(grains: usize) -> usize {
     (SLOTS_PER_GRAIN * grains).max(FEWEST).next_power_of_two()
+}
+
+/// Into how many cells a period is cut for so many grains, at most.
+pub(super) fn cells_of_period(grains: usize) -> usize {
+    if grains > MOST_SPARSE { CELLS_PER_GRAIN * grains } else { slots(grains) }
 }
 
 /// Up to three grains of one slot, and where the rest are: all that a search wants to know, in 16 bytes.
