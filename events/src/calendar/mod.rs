@@ -81,8 +81,8 @@ pub trait Calendar: Default {
     /// The first event and its owner; it stays in the calendar.
     fn next(&mut self) -> Option<(u32, Event)>;
 
-    /// Adds to `owners` those whose events come soon: each in its turn, well before its event comes, and once. Those that were scheduled at
-    /// short notice are not among them, and a calendar that does not know adds none.
+    /// Adds to `owners`, which is empty, those whose events come soon, so that what they need can be fetched from memory: each in its turn, well before its
+    /// event comes, and as a rule once. Those that were scheduled at short notice are not among them, and a calendar that does not know adds none.
     fn coming(&mut self, _owners: &mut Vec<u32>) {}
 
     /// Asks the memory for what is kept of `owner`, if there is such an owner.
