@@ -19,8 +19,8 @@ const JETS: [u32; 3] = [8_000, 100_000, 1_000_000];
 const MELTING: f64 = 4.0;
 const ROUNDS: u32 = 5;
 
-/// Both from copies of `start`, a part of the way after the other.
-fn race<S: Surface + Clone + Send + Sync>(start: &EventDriven<S>, part: f64, rounds: u32) -> Duel {
+/// Both from copies of `start`, a part of the way after the other; and how many events two cores resolved for each that happened.
+fn race<S: Surface + Clone + Send + Sync>(start: &EventDriven<S>, part: f64, rounds: u32) -> (Duel, f64) {
     let (mut one, mut two) = (start.clone(), Halves::of(start.clone()));
     let clock = Instant::now();
     let duel = duel_by(
@@ -40,7 +40,8 @@ fn race<S: Surface + Clone + Send + Sync>(start: &EventDriven<S>, part: f64, rou
     );
     let states = |snapshot: &impinge::grains::Snapshot<'_>| snapshot.flights.to_vec();
     assert!(one.snapshot(one.time(), states) == two.snapshot(two.time(), states), "not the same bits");
-    duel
+    let windows = two.windows();
+    (duel, windows.resolved as f64 / windows.told as f64)
 }
 
 fn main() {
@@ -53,11 +54,11 @@ fn race_all() {
     let within = |grains: f64| grains <= 1.01 * if trial() { 1e4 } else { largest };
     let rounds = if trial() { 1 } else { ROUNDS };
     eprintln!(
-        "{:42} {:>10} {:>10} {:>10} {:>8}",
-        "elapsed time per collision", "collisions", "one core", "two cores", "one/two"
+        "{:42} {:>10} {:>10} {:>10} {:>8} {:>15}",
+        "elapsed time per collision", "collisions", "one core", "two cores", "one/two", "resolved/event"
     );
-    let line = |name: String, Duel { microseconds: [one, two], ratio, collisions }| {
-        eprintln!("{name:42} {collisions:10} {one:7.3} µs {two:7.3} µs {:8.2}", 1.0 / ratio);
+    let line = |name: String, (Duel { microseconds: [one, two], ratio, collisions }, resolved): (Duel, f64)| {
+        eprintln!("{name:42} {collisions:10} {one:7.3} µs {two:7.3} µs {:8.2} {resolved:15.2}", 1.0 / ratio);
     };
     for cells in GASES.into_iter().filter(|&cells| within(4.0 * f64::from(cells).powi(3))) {
         for fraction in [0.1, 0.4] {

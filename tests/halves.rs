@@ -123,6 +123,8 @@ fn gases_of_unequal_rough_grains_that_cool() {
     let case = Case { grains, surface: nothing(), domain, laws: laws(0.8, ROUGH) };
     let (windows, log) = case.compare(60.0, 2);
     assert!(log.0.len() > 8_000 && windows.cut_short > 1, "{} collisions, {windows:?}", log.0.len());
+    assert!(windows.told <= log.0.len() as u64 && windows.told > log.0.len() as u64 / 2, "{windows:?}");
+    assert!((windows.told..2 * windows.told).contains(&windows.resolved), "{windows:?}");
 }
 
 #[test]

@@ -105,6 +105,10 @@ pub struct Windows {
     pub cut_short: u64,
     /// How many were left to one engine.
     pub alone: u64,
+    /// Events that the two halves resolved in the others, also those of copies and those that were undone.
+    pub resolved: u64,
+    /// Events that happened in these windows: more than half as many as were resolved, or two cores are of no use.
+    pub told: u64,
 }
 
 /// What becomes of the copy of a grain.
@@ -220,6 +224,7 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
         }
         self.now = until;
         for half in &self.halves {
+            self.windows.resolved += half.log.events.len() as u64;
             self.sharing.fastest = self.sharing.fastest.max(half.log.fastest);
         }
         self.turn_back(from + self.sharing.safe_for(self.sharing.fastest));
@@ -279,6 +284,7 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
                 let mut belong = event.grains().map(|grain| self.sharing.belongs_to(half, grain));
                 // What happened across the cut the first half tells.
                 if if half == 0 { belong.any(|ours| ours) } else { belong.all(|ours| ours) } {
+                    self.windows.told += 1;
                     let (collisions, gone) = logs[half].tell(next[half], observer);
                     self.collisions += collisions;
                     self.inside -= gone;
