@@ -259,6 +259,7 @@ impl Buckets {
                 continue;
             }
             self.now += 1;
+            // Before their buckets are announced, or owners on their way into these lists would not be.
             if self.staging.earliest() - FAR / 2 < self.now {
                 self.link_staged();
             }
