@@ -32,6 +32,7 @@
 //!
 //! Lengths are in metres, times in seconds, or in any other consistent units: nothing here has a scale.
 
+mod blocks;
 pub mod calendar;
 pub mod contact_time;
 mod domain;

@@ -14,7 +14,8 @@ use nalgebra::Vector3;
 use wide::{f64x4, u32x4};
 
 use self::layout::{FEWEST_PERIODIC_CELLS, Layout, contact_width};
-use self::slots::{Block, Slots, TURNED};
+use self::slots::{Slots, TURNED};
+use crate::blocks::Block;
 use crate::prefetch::prefetch;
 use crate::{Domain, Flight};
 

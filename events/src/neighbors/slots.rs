@@ -1,5 +1,6 @@
 //! The table of cells: hashed, so that memory follows the grains and not the domain; in a period, where cells are few enough, one slot a cell.
 
+use crate::blocks::{Block, Blocks};
 use crate::prefetch::prefetch;
 
 /// Slots for each grain, at least; cells are no smaller than to have one each.
@@ -24,31 +25,7 @@ pub(super) fn cells_of_period(grains: usize) -> usize {
     if grains > MOST_SPARSE { CELLS_PER_GRAIN * grains } else { slots(grains) }
 }
 
-/// Up to three grains of one slot, and where the rest are: all that a search wants to know, in 16 bytes.
-#[derive(Clone, Copy, Debug, Default)]
-#[repr(C, align(16))]
-pub(super) struct Block {
-    /// The first [`count`](Self::count) of the first three are grains, with the bit [`TURNED`] or without; the rest of these are 0. The last is how many
-    /// they are, and four times the index of the next block with grains of this slot, or 0 if there is none.
-    pub(super) words: [u32; 4],
-}
-
 impl Block {
-    /// So many grains fit.
-    pub(super) const ROOM: usize = 3;
-
-    /// How many grains are in the block.
-    #[inline]
-    pub(super) fn count(&self) -> usize {
-        (self.words[Self::ROOM] % 4) as usize
-    }
-
-    /// Where the next block is; 0 stands for nowhere.
-    #[inline]
-    fn next(&self) -> u32 {
-        self.words[Self::ROOM] / 4
-    }
-
     /// Not 0 if one of its grains is [`TURNED`].
     #[inline]
     pub(super) fn turned(&self) -> u32 {
@@ -58,8 +35,7 @@ impl Block {
     /// The grains in the block.
     #[inline]
     pub(super) fn grains(&self) -> impl Iterator<Item = u32> + use<> {
-        let words = self.words;
-        (0..self.count()).map(move |at| words[at] & !TURNED)
+        self.numbers().map(|grain| grain & !TURNED)
     }
 }
 
@@ -68,10 +44,8 @@ impl Block {
 pub(super) struct Slots {
     /// What of the number of a cell tells its slot.
     mask: usize,
-    /// The first block of each slot, and further ones, all of them full: these come after the slots.
-    blocks: Vec<Block>,
-    /// Further blocks that are free.
-    free: Vec<u32>,
+    /// The grains in each slot, with the bit [`TURNED`] or without.
+    grains: Blocks,
     /// Whether there is a grain in the slot before each slot (bit 0), in it, and in the slot after it (bit 2): so an empty cell costs next to
     /// nothing.
     occupied: Vec<u8>,
@@ -88,7 +62,7 @@ impl Slots {
                 (slots, slots - 1)
             }
         };
-        Self { mask, blocks: vec![Block::default(); slots], free: Vec::new(), occupied: vec![0; slots] }
+        Self { mask, grains: Blocks::new(slots), occupied: vec![0; slots] }
     }
 
     /// Index of the first block of a cell.
@@ -100,81 +74,37 @@ impl Slots {
     /// The first block of a cell.
     #[inline]
     pub(super) fn first_block(&self, number: u32) -> &Block {
-        &self.blocks[self.first(number)]
+        self.grains.first(self.first(number))
     }
 
     /// The next one of the same cell.
     #[inline]
     pub(super) fn next_block(&self, block: &Block) -> Option<&Block> {
-        (block.next() != 0).then(|| &self.blocks[block.next() as usize])
+        self.grains.next(block)
     }
 
     /// Puts `grain`, which may be [`TURNED`], into a cell.
     #[inline]
     pub(super) fn insert(&mut self, number: u32, grain: u32) {
-        let first = self.first(number);
-        let mut block = self.blocks[first];
-        if block.words[Block::ROOM] == 0 {
+        if self.grains.add(self.first(number), grain) {
             self.toggle(number);
         }
-        if block.count() == Block::ROOM {
-            block = Block { words: [0, 0, 0, 4 * self.set_aside(block)] };
-        }
-        block.words[block.count()] = grain;
-        block.words[Block::ROOM] += 1;
-        self.blocks[first] = block;
     }
 
-    /// Keeps a full block elsewhere; gives its index.
-    #[cold]
-    fn set_aside(&mut self, block: Block) -> u32 {
-        if let Some(index) = self.free.pop() {
-            self.blocks[index as usize] = block;
-            return index;
-        }
-        self.blocks.push(block);
-        (self.blocks.len() - 1) as u32
-    }
-
-    /// Takes `grain` out of its cell. Its place goes to the last one of the first block.
+    /// Takes `grain` out of its cell.
     #[inline]
     pub(super) fn remove(&mut self, number: u32, grain: u32) {
-        let first = self.first(number);
-        let (index, place) = self.find(number, grain);
-        let mut block = self.blocks[first];
-        let last = block.count() - 1;
-        self.blocks[index].words[place] = block.words[last];
-        block = self.blocks[first];
-        block.words[last] = 0;
-        block.words[Block::ROOM] -= 1;
-        if block.words[Block::ROOM] == 0 {
-            self.toggle(number);
-        } else if last == 0 {
-            let next = block.next();
-            block = std::mem::take(&mut self.blocks[next as usize]);
-            self.free.push(next);
+        match self.grains.remove(self.first(number), |other| other & !TURNED == grain) {
+            Some(true) => self.toggle(number),
+            Some(false) => {}
+            None => panic!("grain {grain} is not in its cell"),
         }
-        self.blocks[first] = block;
     }
 
     /// Says whether `grain` is [`TURNED`] (that bit, or 0).
     pub(super) fn turn(&mut self, number: u32, grain: u32, turned: u32) {
-        let (index, place) = self.find(number, grain);
-        self.blocks[index].words[place] = grain | turned;
-    }
-
-    /// The block that holds `grain`, and where.
-    #[inline]
-    fn find(&self, number: u32, grain: u32) -> (usize, usize) {
-        let mut index = self.first(number);
-        loop {
-            let block = &self.blocks[index];
-            if let Some(place) = block.grains().position(|other| other == grain) {
-                return (index, place);
-            }
-            index = block.next() as usize;
-            assert!(index != 0, "grain {grain} is not in its cell");
-        }
+        let found = self.grains.find_mut(self.first(number), |other| other & !TURNED == grain);
+        *found.unwrap_or_else(|| panic!("grain {grain} is not in its cell")) = grain | turned;
     }
 
     /// Tells the slots beside a slot, and itself, that its first grain has come, or its last one has gone.
@@ -196,7 +126,7 @@ impl Slots {
     #[inline]
     pub(super) fn fetch(&self, number: u32) {
         prefetch(&self.occupied, self.first(number));
-        prefetch(&self.blocks, self.first(number));
+        self.grains.fetch(self.first(number));
     }
 
     /// Asks the memory for the slots before, of and after that of a cell.
@@ -204,15 +134,14 @@ impl Slots {
     pub(super) fn fetch_three(&self, number: u32) {
         prefetch(&self.occupied, self.first(number));
         // Three blocks may lie in two cache lines.
-        prefetch(&self.blocks, self.first(number.wrapping_sub(1)));
-        prefetch(&self.blocks, self.first(number.wrapping_add(1)));
+        self.grains.fetch(self.first(number.wrapping_sub(1)));
+        self.grains.fetch(self.first(number.wrapping_add(1)));
     }
 
     /// The grains in the first block of a cell and whether the slots about it are occupied; nothing where there is no such cell.
     #[inline]
     pub(super) fn glance(&self, number: u32) -> (Block, u8) {
         let first = self.first(number);
-        let both = self.blocks.get(first).zip(self.occupied.get(first));
-        both.map_or_else(Default::default, |(&block, &occupied)| (block, occupied))
+        (self.grains.glance(first), self.occupied.get(first).copied().unwrap_or_default())
     }
 }
