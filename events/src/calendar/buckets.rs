@@ -4,7 +4,8 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use super::staging::Staging;
-use super::{Calendar, Event, Kind, NOBODY, Plan, never};
+use super::{Calendar, Event, Kind, Plan, never};
+use crate::blocks::Blocks;
 use crate::prefetch::prefetch;
 
 /// Buckets for each event: as many as hold most of the waiting times when about one event is in each.
@@ -26,8 +27,8 @@ const FETCHED: i64 = 8;
 const MANY: usize = 1 << 17;
 const FAR: i64 = 64;
 const _: () = assert!(FAR / 2 > ANNOUNCED);
-/// Stands in place of the owner before one that is yet to enter its list.
-const STAGED: u32 = NOBODY - 1;
+/// The buckets are laid out anew when more entries than so many times their number wait: most of them are of events that are no longer.
+const MOST_WAITING: usize = 4;
 
 /// A calendar in which an owner is rescheduled in a time that does not grow with the number of owners.
 ///
@@ -37,8 +38,8 @@ const STAGED: u32 = NOBODY - 1;
 #[derive(Clone, Debug)]
 pub struct Buckets {
     owners: Vec<Owner>,
-    /// First owner in the list of each bucket of a turn.
-    first: Vec<u32>,
+    /// The owners in each bucket of a turn, and some whose event is no longer there.
+    lists: Blocks,
     /// Events of the present bucket and all before it, and some that are no longer so.
     present: BinaryHeap<Entry>,
     /// The present bucket, counted from `origin`.
@@ -49,10 +50,8 @@ pub struct Buckets {
     origin: f64,
     /// Buckets in a second, 1/s; 0 where they are not laid out.
     rate: f64,
-    /// Owners that wait in the lists of this turn.
+    /// Entries in the lists of this turn.
     waiting: usize,
-    /// Owners that wait for later turns, in no list.
-    later: usize,
     /// Events that have come into the heap in this turn.
     passed: usize,
     /// The same since the buckets were laid out, until this turn, and how many owners there were whenever one began.
@@ -61,8 +60,6 @@ pub struct Buckets {
     part: (i64, usize),
     /// The bucket up to which it was said who comes.
     announced: i64,
-    /// Those that come after the ones that were named last, in the same lists.
-    following: Vec<u32>,
     /// Owners that are yet to enter their lists.
     staging: Staging,
 }
@@ -72,9 +69,6 @@ pub struct Buckets {
 #[repr(align(64))]
 struct Owner {
     event: Event,
-    /// Who stands before and after it in the list where it waits.
-    before: u32,
-    after: u32,
     plan: Plan,
 }
 
@@ -82,7 +76,7 @@ const _: () = assert!(size_of::<Owner>() == 64);
 
 impl Default for Owner {
     fn default() -> Self {
-        Self { event: never(Kind::Exit), before: NOBODY, after: NOBODY, plan: Plan::default() }
+        Self { event: never(Kind::Exit), plan: Plan::default() }
     }
 }
 
@@ -126,19 +120,17 @@ impl Default for Buckets {
     fn default() -> Self {
         Self {
             owners: Vec::new(),
-            first: vec![NOBODY; 1],
+            lists: Blocks::new(1),
             present: BinaryHeap::new(),
             now: 0,
             turn: 0,
             origin: 0.0,
             rate: 0.0,
             waiting: 0,
-            later: 0,
             passed: 0,
             passed_before: 0,
             part: (0, 0),
             announced: 0,
-            following: Vec::new(),
             staging: Staging::default(),
         }
     }
@@ -148,7 +140,7 @@ impl Buckets {
     /// How many buckets are in a turn: a power of two.
     #[inline]
     fn buckets(&self) -> i64 {
-        self.first.len() as i64
+        self.lists.lists() as i64
     }
 
     /// The bucket of a time.
@@ -172,79 +164,33 @@ impl Buckets {
 
     /// Puts the event of `owner` where it belongs.
     #[inline]
-    fn enter(&mut self, owner: u32) {
-        if self.rate == 0.0 {
-            return;
-        }
-        let event = self.owners[owner as usize].event;
+    fn enter(&mut self, owner: u32, event: Event) {
         let bucket = self.bucket(event.time);
         if bucket <= self.now {
             self.passed += 1;
             return self.present.push(Entry { event, owner });
         }
+        // Those of later turns are looked for when their turn comes.
         if self.is_later(bucket) {
-            self.later += 1;
             return;
         }
-        let list = self.list(bucket);
         self.waiting += 1;
-        if self.first.len() < MANY || bucket - self.now < FAR {
-            return self.link(owner, list);
-        }
-        prefetch(&self.first, list);
-        self.owners[owner as usize].before = STAGED;
-        let longest = self.staging.enter(owner, bucket);
-        if longest != NOBODY {
-            self.link(longest, self.list(self.bucket(self.owners[longest as usize].event.time)));
+        let list = self.list(bucket);
+        if self.lists.lists() >= MANY && bucket - self.now >= FAR {
+            self.lists.fetch(list);
+            if let Some((owner, list)) = self.staging.enter(owner, list, bucket) {
+                self.lists.add(list, owner);
+            }
+        } else {
+            self.lists.add(list, owner);
         }
     }
 
     /// Lets all owners that are yet to enter their lists do so.
     #[cold]
-    fn link_staged(&mut self) {
-        for owner in self.staging.take() {
-            self.link(owner, self.list(self.bucket(self.owners[owner as usize].event.time)));
-        }
-    }
-
-    /// Puts `owner` at the head of a list.
-    #[inline]
-    fn link(&mut self, owner: u32, list: usize) {
-        let after = std::mem::replace(&mut self.first[list], owner);
-        let ours = &mut self.owners[owner as usize];
-        (ours.before, ours.after) = (NOBODY, after);
-        if after != NOBODY {
-            self.owners[after as usize].before = owner;
-        }
-    }
-
-    /// Takes the event of `owner` from where it is; the heap forgets it later.
-    #[inline]
-    fn leave(&mut self, owner: u32) {
-        let time = self.owners[owner as usize].event.time;
-        if time == f64::INFINITY {
-            return;
-        }
-        let bucket = self.bucket(time);
-        if bucket <= self.now {
-            return;
-        }
-        if self.is_later(bucket) {
-            self.later -= 1;
-            return;
-        }
-        self.waiting -= 1;
-        let Owner { before, after, .. } = self.owners[owner as usize];
-        match before {
-            STAGED => return self.staging.leave(owner),
-            NOBODY => {
-                let list = self.list(bucket);
-                self.first[list] = after;
-            }
-            _ => self.owners[before as usize].after = after,
-        }
-        if after != NOBODY {
-            self.owners[after as usize].before = before;
+    fn list_staged(&mut self) {
+        for (owner, list) in self.staging.take() {
+            self.lists.add(list, owner);
         }
     }
 
@@ -252,35 +198,36 @@ impl Buckets {
     fn go_on(&mut self) -> bool {
         while self.present.is_empty() {
             if self.waiting == 0 {
-                if self.later == 0 {
+                if !self.start_turn() {
                     return false;
                 }
-                self.start_turn();
                 continue;
             }
             self.now += 1;
             // Before their buckets are announced, or owners on their way into these lists would not be.
             if self.staging.earliest() - FAR / 2 < self.now {
-                self.link_staged();
+                self.list_staged();
             }
             if self.now - self.part.0 == self.buckets() / PARTS_OF_TURN {
                 self.part = (self.now, self.passed);
             }
             let list = self.list(self.now);
-            let mut owner = std::mem::replace(&mut self.first[list], NOBODY);
-            while owner != NOBODY {
-                self.waiting -= 1;
-                self.passed += 1;
-                self.present.push(Entry { event: self.owners[owner as usize].event, owner });
-                owner = self.owners[owner as usize].after;
-            }
+            let (waiting, passed) = (&mut self.waiting, &mut self.passed);
+            self.lists.drain(list, |owner| {
+                *waiting -= 1;
+                let event = self.owners[owner as usize].event;
+                if ((event.time - self.origin) * self.rate) as i64 == self.now {
+                    *passed += 1;
+                    self.present.push(Entry { event, owner });
+                }
+            });
         }
         true
     }
 
-    /// Starts the turn in which the next event is. Nobody waits but for later turns.
+    /// Starts the turn in which the next event is. Nobody waits but for later turns; tells whether there is anybody.
     #[cold]
-    fn start_turn(&mut self) {
+    fn start_turn(&mut self) -> bool {
         self.passed_before += self.passed;
         let few = (self.passed as f64) < FEWEST_EVENTS * self.buckets() as f64;
         // To lay out costs as much as that many events, however few there are in a turn.
@@ -288,36 +235,36 @@ impl Buckets {
             return self.lay_out();
         }
         // To look through all owners, which are side by side, is faster than to follow a list through all of the memory.
-        let waits = |&owner: &u32| {
-            let time = self.owners[owner as usize].event.time;
-            time < f64::INFINITY && self.is_later(self.bucket(time))
-        };
+        let waits = |&owner: &u32| self.owners[owner as usize].event.time < f64::INFINITY;
         let later: Vec<u32> = (0..self.owners.len() as u32).filter(waits).collect();
         let bucket = |&owner: &u32| self.bucket(self.owners[owner as usize].event.time);
-        let next = later.iter().map(bucket).min().unwrap_or(i64::MAX);
+        let Some(next) = later.iter().map(bucket).min() else { return false };
         self.turn = next & !(self.buckets() - 1);
         // The bucket before the next one: everybody is later.
         self.now = next.saturating_sub(1);
         self.passed_before += self.owners.len();
-        (self.passed, self.later, self.part) = (0, 0, (self.now, 0));
-        later.into_iter().for_each(|owner| self.enter(owner));
+        (self.passed, self.part) = (0, (self.now, 0));
+        later.into_iter().for_each(|owner| self.enter(owner, self.owners[owner as usize].event));
+        true
     }
 
-    /// Whether so many events came lately that it pays to lay the buckets out anew.
+    /// Whether so many events came lately, or so many entries wait, that it pays to lay the buckets out anew.
     #[inline]
     fn is_crowded(&self) -> bool {
-        let crowd = MOST_EVENTS * self.first.len() / PARTS_OF_TURN as usize;
-        self.passed - self.part.1 > crowd.max(FEWEST_IN_A_CROWD)
+        let crowd = MOST_EVENTS * self.lists.lists() / PARTS_OF_TURN as usize;
+        let crowded = self.passed - self.part.1 > crowd.max(FEWEST_IN_A_CROWD);
+        crowded || self.waiting > (MOST_WAITING * self.lists.lists()).max(FEWEST_IN_A_CROWD)
     }
 
     /// Chooses the number and the width of the buckets by the events that there are, and by how many came lately: where few owners have most of the
-    /// events, these come much faster than half of all in the median time.
+    /// events, these come much faster than half of all in the median time. Tells whether there is any.
     #[cold]
-    fn lay_out(&mut self) {
+    fn lay_out(&mut self) -> bool {
         let mut times: Vec<f64> =
             self.owners.iter().map(|owner| owner.event.time).filter(|&time| time < f64::INFINITY).collect();
         if times.is_empty() {
-            return;
+            self.clear();
+            return false;
         }
         let count = times.len();
         let (earlier, &mut median, _) = times.select_nth_unstable_by(count / 2, f64::total_cmp);
@@ -326,19 +273,20 @@ impl Buckets {
         let until_median = (0.5 * count as f64 / (median - self.origin)).min(f64::MAX);
         let lately = self.rate * (self.passed - self.part.1) as f64 / ((self.now - self.part.0) as f64 + 1.0);
         self.rate = lately.clamp(until_median, until_median / NARROWEST).min(f64::MAX);
-        self.first.clear();
-        self.first.resize((BUCKETS_PER_EVENT * count).next_power_of_two(), NOBODY);
+        self.lists.reset((BUCKETS_PER_EVENT * count).next_power_of_two());
         self.present.clear();
         (self.now, self.turn, self.announced) = (0, 0, 0);
-        (self.waiting, self.later, self.passed, self.passed_before, self.part) = (0, 0, 0, 0, (0, 0));
+        (self.waiting, self.passed, self.passed_before, self.part) = (0, 0, 0, (0, 0));
         self.staging = Staging::default();
         for owner in 0..self.owners.len() as u32 {
-            if self.owners[owner as usize].event.time < f64::INFINITY {
-                self.enter(owner);
+            let event = self.owners[owner as usize].event;
+            if event.time < f64::INFINITY {
+                self.enter(owner, event);
             }
         }
         // A crowd that is there from the start cannot be told apart by another layout.
         self.part = (0, self.passed);
+        true
     }
 }
 
@@ -352,20 +300,20 @@ impl Calendar for Buckets {
         if owner as usize >= self.owners.len() {
             self.reserve(owner as usize + 1);
         }
-        if self.owners[owner as usize].event == event {
+        let ours = &mut self.owners[owner as usize].event;
+        if *ours == event {
             return;
         }
-        self.leave(owner);
-        self.owners[owner as usize].event = event;
-        if event.time < f64::INFINITY {
-            self.enter(owner);
+        // Where the one before has entered it is passed over when its turn comes.
+        *ours = event;
+        if event.time < f64::INFINITY && self.rate > 0.0 {
+            self.enter(owner, event);
         }
     }
 
     fn cancel(&mut self, owner: u32) {
-        if (owner as usize) < self.owners.len() {
-            self.leave(owner);
-            self.owners[owner as usize].event = never(Kind::Exit);
+        if let Some(owner) = self.owners.get_mut(owner as usize) {
+            owner.event = never(Kind::Exit);
         }
     }
 
@@ -389,10 +337,10 @@ impl Calendar for Buckets {
 
     fn clear(&mut self) {
         self.owners.iter_mut().for_each(|owner| owner.event = never(Kind::Exit));
-        self.first.fill(NOBODY);
+        self.lists.reset(1);
         self.present.clear();
         (self.now, self.turn, self.announced) = (0, 0, 0);
-        (self.waiting, self.later, self.passed, self.passed_before, self.part) = (0, 0, 0, 0, (0, 0));
+        (self.waiting, self.passed, self.passed_before, self.part) = (0, 0, 0, (0, 0));
         self.staging = Staging::default();
         self.rate = 0.0;
     }
@@ -401,23 +349,12 @@ impl Calendar for Buckets {
         let buckets = self.buckets();
         let last = self.now.saturating_add(ANNOUNCED).min(self.turn + (buckets - 1));
         self.announced = self.announced.max(self.now);
-        owners.append(&mut self.following);
         while self.announced < last {
             self.announced += 1;
             let list = |bucket: i64| (bucket & (buckets - 1)) as usize;
-            self.fetch(self.first[list(self.announced + FETCHED)]);
-            let first = self.first[list(self.announced)];
-            if first != NOBODY {
-                owners.push(first);
-            }
-        }
-        // To go through whole lists at once would be to wait for each of their owners.
-        for &owner in owners.iter() {
-            let after = self.owners[owner as usize].after;
-            if after != NOBODY {
-                self.fetch(after);
-                self.following.push(after);
-            }
+            self.lists.first(list(self.announced + FETCHED)).numbers().for_each(|owner| self.fetch(owner));
+            let comes = |&owner: &u32| self.bucket(self.owners[owner as usize].event.time) == self.announced;
+            owners.extend(self.lists.numbers(list(self.announced)).filter(comes));
         }
     }
 
@@ -567,7 +504,7 @@ mod tests {
                 now = plain.next().map_or(now, |(_, event)| event.time);
             }
         }
-        assert!(fast.first.len() >= MANY);
+        assert!(fast.lists.lists() >= MANY);
         while let Some((owner, event)) = plain.next() {
             assert_eq!(fast.next(), Some((owner, event)));
             fast.cancel(owner);
@@ -587,6 +524,38 @@ mod tests {
             assert!(!calendar.is_crowded());
             calendar.cancel(owner);
         }
+    }
+
+    /// Entries of events that were given up went on to wait, and a calendar with nothing else was laid out without end.
+    #[test]
+    fn a_calendar_whose_events_were_all_given_up_is_empty() {
+        let mut calendar = Buckets::default();
+        let event = |time| Event { time, kind: Kind::Grains, partner: 0 };
+        (0..64).for_each(|owner| calendar.schedule(owner, event(f64::from(owner))));
+        // Two owners have all events but the first, again and again: more than there are buckets come, and few in a turn.
+        for step in 0..2000 {
+            let (owner, first) = calendar.next().expect("all wait");
+            calendar.schedule(owner, event(first.time + if owner < 2 { 0.01 } else { 100.0 + f64::from(step) }));
+            // Given up and given back: each time an entry more that is of no use.
+            calendar.schedule(63, event(1e3 + f64::from(step % 7)));
+        }
+        (0..64).for_each(|owner| calendar.cancel(owner));
+        assert_eq!((calendar.next(), calendar.waiting), (None, 0));
+        calendar.schedule(5, event(1e5));
+        assert_eq!(calendar.next(), Some((5, event(1e5))));
+    }
+
+    /// An owner whose event is moved to and fro does not fill the memory with entries of those it had.
+    #[test]
+    fn entries_that_are_of_no_use_do_not_grow_without_end() {
+        let mut calendar = Buckets::default();
+        let event = |time| Event { time, kind: Kind::Grains, partner: 0 };
+        (0..1000).for_each(|owner| calendar.schedule(owner, event(f64::from(owner))));
+        for step in 0..1_000_000 {
+            calendar.schedule(500, event(500.0 + f64::from(step % 100)));
+            assert_eq!(calendar.next(), Some((0, event(0.0))));
+        }
+        assert!(calendar.waiting <= 2 * MOST_WAITING * calendar.lists.lists(), "{}", calendar.waiting);
     }
 
     #[test]
