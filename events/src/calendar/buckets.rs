@@ -9,7 +9,7 @@ use crate::blocks::Blocks;
 use crate::prefetch::prefetch;
 
 /// Buckets for each event: as many as hold most of the waiting times when about one event is in each.
-const BUCKETS_PER_EVENT: usize = 2;
+const BUCKETS_PER_EVENT: usize = 1;
 /// The buckets are laid out anew when fewer events than this part of their number have come in a turn, or more than so many times their number in one of
 /// so many parts of it; where there are few buckets, more than that.
 const FEWEST_EVENTS: f64 = 0.25;
@@ -235,16 +235,22 @@ impl Buckets {
             return self.lay_out();
         }
         // To look through all owners, which are side by side, is faster than to follow a list through all of the memory.
-        let waits = |&owner: &u32| self.owners[owner as usize].event.time < f64::INFINITY;
-        let later: Vec<u32> = (0..self.owners.len() as u32).filter(waits).collect();
-        let bucket = |&owner: &u32| self.bucket(self.owners[owner as usize].event.time);
-        let Some(next) = later.iter().map(bucket).min() else { return false };
+        let first = self.owners.iter().map(|owner| owner.event.time).fold(f64::INFINITY, f64::min);
+        if first == f64::INFINITY {
+            return false;
+        }
+        let next = self.bucket(first);
         self.turn = next & !(self.buckets() - 1);
-        // The bucket before the next one: everybody is later.
+        // The bucket before the next one: nobody's is past.
         self.now = next.saturating_sub(1);
         self.passed_before += self.owners.len();
         (self.passed, self.part) = (0, (self.now, 0));
-        later.into_iter().for_each(|owner| self.enter(owner, self.owners[owner as usize].event));
+        for owner in 0..self.owners.len() as u32 {
+            let event = self.owners[owner as usize].event;
+            if event.time < f64::INFINITY {
+                self.enter(owner, event);
+            }
+        }
         true
     }
 

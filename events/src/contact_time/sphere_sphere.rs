@@ -91,8 +91,8 @@ pub fn spheres_may_touch(a: &Flight, b: &Flight, shift: Vector3<f64>, until: f64
     // r² - s² falls by less than 2 approach t within t.
     let in_time = separation <= approach * (2.0 * (until - a.time));
     let on_course = v2 * separation <= approach * approach;
-    // Where squares of speeds underflow nothing is known.
-    in_time & on_course | (v2 < SMALLEST_SPEED_SQUARED)
+    // Where squares of speeds underflow the course is not known; whoever flies side by side is never in time.
+    in_time & (on_course | (v2 < SMALLEST_SPEED_SQUARED))
 }
 
 /// [`spheres_may_touch`] for one sphere and two others at once: bit k tells of the k-th.
@@ -112,7 +112,7 @@ pub fn spheres_may_touch_two(a: &Flight, others: [&Flight; 2], until: f64) -> u3
     let in_time = separation.simd_le(approach * (2.0 * (until - a.time)));
     let on_course = (v2 * separation).simd_le(approach * approach);
     let unknown = v2.simd_lt(f64x2::splat(SMALLEST_SPEED_SQUARED));
-    (in_time & on_course | unknown).to_bitmask()
+    (in_time & (on_course | unknown)).to_bitmask()
 }
 
 /// What rounding may do to the squares of distances in a bound, relative: much more than it does (as far as 1e9 radii from the origin), and too little to
