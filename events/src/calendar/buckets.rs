@@ -301,7 +301,8 @@ impl Calendar for Buckets {
         self.owners.resize(owners.max(self.owners.len()), Owner::default());
     }
 
-    #[inline]
+    // In one piece with what chose the event, or it goes through memory, and is read there in other pieces than it was written.
+    #[inline(always)]
     fn schedule(&mut self, owner: u32, event: Event) {
         if owner as usize >= self.owners.len() {
             self.reserve(owner as usize + 1);

@@ -606,7 +606,8 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         self.reschedule(grain);
     }
 
-    #[inline]
+    /// Puts what comes first of the plan of a grain into the calendar.
+    #[inline(never)]
     fn reschedule(&mut self, grain: u32) {
         let first = self.calendar.plan(grain).first();
         if first.time > self.horizon {
