@@ -24,7 +24,7 @@ const ANNOUNCED: i64 = 24;
 const FETCHED: i64 = 8;
 /// From so many buckets on their lists do not fit the caches: an owner enters one that is at least so many ahead only after some others, once its first owner has
 /// come from memory.
-const MANY: usize = 1 << 17;
+const MANY: usize = 1 << 14;
 const FAR: i64 = 64;
 const _: () = assert!(FAR / 2 > ANNOUNCED);
 /// The buckets are laid out anew when more entries than so many times their number wait: most of them are of events that are no longer.

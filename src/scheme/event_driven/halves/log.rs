@@ -8,24 +8,6 @@ use crate::grains::Grain;
 use crate::scheme::event_driven::collapse::Row;
 use crate::scheme::{GrainCollision, Observer, Passage, SurfaceHit};
 
-/// What a grain was before an encounter.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Before {
-    pub(super) grain: u32,
-    pub(super) hits: u32,
-    pub(super) position: Vector3<f64>,
-    pub(super) time: f64,
-    pub(super) velocity: Vector3<f64>,
-    pub(super) radius: f64,
-    pub(super) spin: Vector3<f64>,
-}
-
-impl Before {
-    pub(super) fn flight(&self) -> Flight {
-        Flight { position: self.position, time: self.time, velocity: self.velocity, radius: self.radius }
-    }
-}
-
 /// An encounter that has been resolved.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Happened {
@@ -33,7 +15,19 @@ pub(super) struct Happened {
     pub(super) encounter: Encounter,
     /// How much was told to observers before it.
     pub(super) told: u32,
-    pub(super) before: [Before; 2],
+}
+
+/// What a grain carried before an encounter that changed it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Carried {
+    pub(super) spin: Vector3<f64>,
+    pub(super) hits: u32,
+}
+
+impl Carried {
+    pub(super) fn by(grain: &Grain) -> Self {
+        Self { spin: grain.spin, hits: grain.hits }
+    }
 }
 
 /// The place of an encounter in the order of events.
@@ -50,35 +44,40 @@ impl Happened {
         (self.time.to_bits(), kind, ids)
     }
 
-    /// The grains that took part.
-    pub(super) fn grains(&self) -> impl Iterator<Item = u32> {
-        self.befores().map(|before| before.grain)
+    /// The two grains that took part; twice the same where it was one.
+    pub(super) fn both(&self) -> [u32; 2] {
+        match self.encounter {
+            Encounter::Grains { a, b } => [a, b],
+            Encounter::Surface { grain, .. } | Encounter::Exit { grain } => [grain; 2],
+        }
     }
 
-    /// Their flights until then.
-    pub(super) fn flights(&self) -> impl Iterator<Item = (u32, Flight)> {
-        self.befores().map(|before| (before.grain, before.flight()))
-    }
-
-    pub(super) fn befores(&self) -> impl Iterator<Item = &Before> {
-        let count = if matches!(self.encounter, Encounter::Grains { .. }) { 2 } else { 1 };
-        self.before[..count].iter()
+    /// Each grain that took part.
+    pub(super) fn grains(&self) -> impl Iterator<Item = u32> + use<> {
+        let [first, second] = self.both();
+        [first, second].into_iter().take(if first == second { 1 } else { 2 })
     }
 }
 
-/// What observers are to be told.
+/// What observers are to be told. Most of it is collisions; where the rest is, which is longer, is told by a number.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Record {
     Collision(GrainCollision),
-    Hit(SurfaceHit),
-    Passage(Passage, f64, Flight, Grain),
+    Hit(u32),
+    Passage(u32),
 }
 
-/// What happened to one half, in order.
+/// What happened to one half, in order. It is written and read once a window, from the cache of the one core into that of the other: so it is short.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Log {
     pub(super) events: Vec<Happened>,
+    /// The flights of the grains of each event until then.
+    pub(super) flights: Vec<[Flight; 2]>,
+    /// What grains carried besides until an event of this number changed it, in order.
+    pub(super) carried: Vec<(u32, u32, Carried)>,
     pub(super) records: Vec<Record>,
+    hits: Vec<SurfaceHit>,
+    passages: Vec<(Passage, f64, Flight, Grain)>,
     /// The rows of the grains of each event before it, where collapses are treated.
     pub(super) rows: Vec<[Row; 2]>,
     /// Which events have to do with grains that are known to both halves.
@@ -99,18 +98,24 @@ impl Observer for Log {
     }
 
     fn surface_hit(&mut self, hit: &SurfaceHit) {
-        self.records.push(Record::Hit(*hit));
+        self.records.push(Record::Hit(self.hits.len() as u32));
+        self.hits.push(*hit);
     }
 
     fn passage(&mut self, passage: Passage, time: f64, flight: &Flight, grain: &Grain) {
-        self.records.push(Record::Passage(passage, time, *flight, *grain));
+        self.records.push(Record::Passage(self.passages.len() as u32));
+        self.passages.push((passage, time, *flight, *grain));
     }
 }
 
 impl Log {
     pub(super) fn clear(&mut self) {
         self.events.clear();
+        self.flights.clear();
+        self.carried.clear();
         self.records.clear();
+        self.hits.clear();
+        self.passages.clear();
         self.rows.clear();
         self.shared.clear();
         self.to_watch.clear();
@@ -124,14 +129,22 @@ impl Log {
         for record in &self.records[self.events[event].told as usize..end] {
             match record {
                 Record::Collision(collision) => observer.grain_collision(collision),
-                Record::Hit(hit) => observer.surface_hit(hit),
-                Record::Passage(passage, time, flight, grain) => observer.passage(*passage, *time, flight, grain),
+                Record::Hit(number) => observer.surface_hit(&self.hits[*number as usize]),
+                Record::Passage(number) => {
+                    let (passage, time, flight, grain) = &self.passages[*number as usize];
+                    observer.passage(*passage, *time, flight, grain);
+                }
             }
             let passed = matches!(record, Record::Passage(..));
             collisions += u64::from(!passed);
             gone += usize::from(passed);
         }
         (collisions, gone)
+    }
+
+    /// The grains of an event of this number, and their flights until then.
+    pub(super) fn flights_of(&self, number: usize) -> impl Iterator<Item = (u32, Flight)> + use<> {
+        self.events[number].grains().zip(self.flights[number])
     }
 
     /// How many events come before the first one of which `is_late` says so. Rounding may let an event be found when its time is over, so times do not

@@ -306,7 +306,7 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
         let of = |half: usize| {
             let (engine, sharing) = (&self.halves[half].engine, &self.sharing);
             let (mut watched, mut fastest) = (Vec::new(), 0.0_f64);
-            for grain in (0..sharing.owner.len() as u32).filter(|&grain| sharing.belongs_to(half, grain)) {
+            for grain in (0..sharing.slots() as u32).filter(|&grain| sharing.belongs_to(half, grain)) {
                 let flight = engine.encounters.flight(grain);
                 fastest = fastest.max(sharing.speed(flight));
                 if sharing.may_change(half, grain, flight, self.now) {
@@ -382,7 +382,7 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
         self.windows.alone += 1;
         self.undo([0, 0], self.now);
         let [whole, other] = &mut self.halves;
-        let theirs = (0..).zip(&self.sharing.owner).filter(|&(_, &owner)| owner == 1).map(|(grain, _)| grain);
+        let theirs = (0..self.sharing.slots() as u32).filter(|&grain| self.sharing.belongs_to(1, grain));
         let theirs: Vec<u32> = theirs.filter(|&grain| other.engine.encounters.is_inside(grain)).collect();
         for &grain in &theirs {
             whole.engine.grains[grain as usize] = other.engine.grains[grain as usize];
@@ -421,8 +421,8 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
 
     /// The grains inside, each in the half to which it belongs.
     fn own(&self) -> impl Iterator<Item = (&EventDriven<S, C>, u32)> + Clone {
-        (0..).zip(&self.sharing.owner).filter_map(|(grain, &owner)| {
-            let engine = &self.halves[usize::from(owner)].engine;
+        (0..self.sharing.slots() as u32).filter_map(|grain| {
+            let engine = &self.halves[self.sharing.owner_of(grain)].engine;
             engine.encounters.is_inside(grain).then_some((engine, grain))
         })
     }

@@ -1,7 +1,7 @@
 //! Who knows which grains, and whether both halves saw the same.
 
 use impinge_events::calendar::Calendar;
-use impinge_events::{Flight, Surface};
+use impinge_events::{Flight, Surface, prefetch};
 
 use super::EventDriven;
 use super::cut::Cut;
@@ -24,10 +24,24 @@ const LEAST_ZONE: f64 = 4.0;
 /// By this part grains keep farther from the cut than they must, so that it is no matter of rounding.
 const MARGIN: f64 = 1e-3;
 
-/// The other half has no copy of a grain.
-pub(super) const NOT_SHARED: f64 = f64::NEG_INFINITY;
-/// The other half has a good copy of a grain.
-pub(super) const SHARED: f64 = f64::INFINITY;
+/// Whether the half to which a grain does not belong has a copy of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum InOther {
+    /// It has none.
+    Nothing,
+    /// It has a good one.
+    Good,
+    /// It has one that has gone wrong.
+    Wrong,
+}
+
+/// Who knows a grain. Every event asks for it, so it is kept in as few bytes as the caches can hold for all grains.
+#[derive(Clone, Copy, Debug)]
+struct Known {
+    /// The half to which it belongs.
+    by: u8,
+    copy: InOther,
+}
 
 /// Each grain belongs to one half; those near the cut have a copy in the other half.
 #[derive(Clone, Debug)]
@@ -49,10 +63,9 @@ pub(super) struct Sharing {
     pub(super) wrong: Vec<u32>,
     /// When a grain whose copy is wrong first came to the cut, s (epoch time).
     strayed: f64,
-    /// To which half each grain belongs.
-    pub(super) owner: Vec<u8>,
-    /// When the copy of each grain went wrong, s (epoch time); [`NOT_SHARED`] or [`SHARED`] where there is none or it is good.
-    pub(super) wrong_since: Vec<f64>,
+    known: Vec<Known>,
+    /// When the copy of each grain went wrong, s (epoch time), if it has.
+    wrong_since: Vec<f64>,
 }
 
 impl Sharing {
@@ -69,12 +82,10 @@ impl Sharing {
         let zone = LEAST_ZONE * margin;
         let most_zone = sorted.get((MOST_COPIES * sorted.len() as f64) as usize).copied().unwrap_or_default().max(zone);
         let slots = engine.grains.len();
-        let (mut owner, mut wrong_since) = (vec![0; slots], vec![NOT_SHARED; slots]);
+        let mut known = vec![Known { by: 0, copy: InOther::Nothing }; slots];
         for (&(grain, _), depth) in grains.iter().zip(depths) {
-            owner[grain as usize] = u8::from(depth < 0.0);
-            if depth.abs() < zone {
-                wrong_since[grain as usize] = SHARED;
-            }
+            let copy = if depth.abs() < zone { InOther::Good } else { InOther::Nothing };
+            known[grain as usize] = Known { by: u8::from(depth < 0.0), copy };
         }
         let (watched, is_watched, wrong) = (Default::default(), vec![[false; 2]; slots], Vec::new());
         let (fastest, surveyed_until, strayed) = (f64::INFINITY, now, f64::INFINITY);
@@ -89,8 +100,8 @@ impl Sharing {
             is_watched,
             wrong,
             strayed,
-            owner,
-            wrong_since,
+            known,
+            wrong_since: vec![f64::INFINITY; slots],
         }
     }
 
@@ -113,7 +124,7 @@ impl Sharing {
         let (depth, way) = (self.depth(half, flight, now), self.speed(flight) * (self.surveyed_until - now));
         match self.is_shared(grain) {
             true => depth < way || depth + way > LINGERING * self.zone,
-            false => depth < self.zone + way || self.wrong_since[grain as usize] != NOT_SHARED,
+            false => depth < self.zone + way || self.is_wrong(grain),
         }
     }
 
@@ -122,34 +133,35 @@ impl Sharing {
         if flight.radius > 0.0 { self.cut.depth(half, flight, now) } else { f64::INFINITY }
     }
 
-    /// Whether there should be a copy of a grain that is so deep (m) inside its half; `copy` tells what there is.
-    fn is_near(&self, depth: f64, copy: f64) -> bool {
-        depth < if copy == SHARED { LINGERING * self.zone } else { self.zone }
+    /// The copy that there should be of a grain that is so deep (m) inside its half, where there is this one.
+    fn due(&self, depth: f64, copy: InOther) -> InOther {
+        let reach = if copy == InOther::Good { LINGERING * self.zone } else { self.zone };
+        if depth < reach { InOther::Good } else { InOther::Nothing }
     }
 
     /// Whether [`change`](Self::change) would do something.
     pub(super) fn has_to_change(&self, half: usize, grain: u32, flight: &Flight, now: f64) -> bool {
-        let (depth, copy) = (self.depth(half, flight, now), self.wrong_since[grain as usize]);
-        let is_crossed = copy == SHARED && depth < 0.0;
-        is_crossed || copy != if self.is_near(depth, copy) { SHARED } else { NOT_SHARED }
+        let (depth, copy) = (self.depth(half, flight, now), self.known[grain as usize].copy);
+        let is_crossed = copy == InOther::Good && depth < 0.0;
+        is_crossed || copy != self.due(depth, copy)
     }
 
     /// Decides about a grain that flies so at `now` (s, epoch time), or is gone: whether the half to which it does not belong has a copy from now on,
     /// if that changes or the copy had gone wrong.
     pub(super) fn change(&mut self, grain: u32, flight: &Flight, now: f64) -> Option<bool> {
         let number = grain as usize;
-        let (depth, copy) = (self.depth(self.owner_of(grain), flight, now), self.wrong_since[number]);
-        if copy == SHARED && depth < 0.0 {
-            self.owner[number] ^= 1;
+        let (depth, copy) = (self.depth(self.owner_of(grain), flight, now), self.known[number].copy);
+        if copy == InOther::Good && depth < 0.0 {
+            self.known[number].by ^= 1;
             self.watch(self.owner_of(grain), &[grain]);
             return None;
         }
-        let is_near = self.is_near(depth, copy);
-        if copy == if is_near { SHARED } else { NOT_SHARED } {
+        let due = self.due(depth, copy);
+        if copy == due {
             return None;
         }
-        self.wrong_since[number] = if is_near { SHARED } else { NOT_SHARED };
-        Some(is_near)
+        self.known[number].copy = due;
+        Some(due == InOther::Good)
     }
 
     /// Watches these grains of each half and no others.
@@ -195,17 +207,28 @@ impl Sharing {
     /// Whether both halves know a grain.
     #[inline]
     pub(super) fn is_shared(&self, grain: u32) -> bool {
-        self.wrong_since[grain as usize] == SHARED
+        self.known[grain as usize].copy == InOther::Good
     }
 
     /// Whether the other half has a copy of a grain that has gone wrong.
     pub(super) fn is_wrong(&self, grain: u32) -> bool {
-        !self.is_shared(grain) && self.wrong_since[grain as usize] != NOT_SHARED
+        self.known[grain as usize].copy == InOther::Wrong
     }
 
     #[inline]
     pub(super) fn owner_of(&self, grain: u32) -> usize {
-        usize::from(self.owner[grain as usize])
+        usize::from(self.known[grain as usize].by)
+    }
+
+    /// How many numbers of grains there are.
+    pub(super) fn slots(&self) -> usize {
+        self.known.len()
+    }
+
+    /// Asks the memory for who knows a grain.
+    #[inline]
+    pub(super) fn fetch(&self, grain: u32) {
+        prefetch(&self.known, grain as usize);
     }
 
     #[inline]
@@ -265,9 +288,9 @@ impl Sharing {
             let first = places.iter().flatten().min().copied()?;
             let seen = places.map(|place| place == Some(first));
             for half in 0..2 {
-                let Some(event) = heads[half].filter(|_| seen[half]) else { continue };
+                let Some((number, event)) = events[half].zip(heads[half]).filter(|_| seen[half]) else { continue };
                 next[half] += 1;
-                if !self.is_agreed(half, event, seen[1 - half]) {
+                if !self.is_agreed(half, logs[half], number, seen[1 - half]) {
                     let counts = [0, 1].map(|half| logs[half].count_before(|event| event.place() >= first));
                     return Some((counts, event.time));
                 }
@@ -275,11 +298,12 @@ impl Sharing {
         }
     }
 
-    /// Whether an event that `half` saw, and the other half too or not, leaves the grains of both halves as they truly are.
-    fn is_agreed(&mut self, half: usize, event: &Happened, by_both: bool) -> bool {
+    /// Whether the event of this number that `half` saw, and the other half too or not, leaves the grains of both halves as they truly are.
+    fn is_agreed(&mut self, half: usize, log: &Log, number: usize, by_both: bool) -> bool {
+        let event = &log.events[number];
         let ours = |sharing: &Self, grain: u32| sharing.belongs_to(half, grain);
         let is_true = event.grains().all(|grain| ours(self, grain) || self.is_shared(grain));
-        for (grain, flight) in event.flights() {
+        for (grain, flight) in log.flights_of(number) {
             let ours = ours(self, grain);
             // The other half did not see what happened to its grain, or ours felt what was not so.
             if if is_true { !by_both && !ours } else { ours } {
@@ -287,11 +311,12 @@ impl Sharing {
             }
             if self.is_shared(grain) {
                 if !is_true || !by_both {
+                    self.known[grain as usize].copy = InOther::Wrong;
                     self.wrong_since[grain as usize] = event.time;
                     self.wrong.push(grain);
                     self.follow(grain, &flight, event.time);
                 }
-            } else if ours && self.wrong_since[grain as usize] != NOT_SHARED {
+            } else if ours && self.is_wrong(grain) {
                 self.follow(grain, &flight, event.time);
             }
         }

@@ -1,13 +1,12 @@
 //! One half of the grains for a short time, and the way back.
 
 use impinge_events::calendar::Calendar;
-use impinge_events::{Encounter, Flight, Surface};
+use impinge_events::{Flight, Surface};
 use rustc_hash::FxHashMap;
 
 use super::EventDriven;
-use super::log::{Before, Happened, Log};
+use super::log::{Carried, Happened, Log};
 use super::sharing::Sharing;
-use crate::grains::Grain;
 use crate::scene::Interference;
 use crate::scheme::Broken;
 
@@ -23,26 +22,24 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         log.clear();
         self.encounters.forget_crossings();
         while let Some((time, encounter)) = self.next_before(until) {
-            let grains = match encounter {
-                Encounter::Grains { a, b } => [a, b],
-                Encounter::Surface { grain, .. } | Encounter::Exit { grain } => [grain; 2],
-            };
-            let flights = self.encounters.before();
-            let before = std::array::from_fn(|k| {
-                let Flight { position, time, velocity, radius } = flights[k];
-                let Grain { spin, hits, .. } = self.grains[grains[k] as usize];
-                Before { grain: grains[k], hits, position, time, velocity, radius, spin }
-            });
-            let event = Happened { time, encounter, told: log.records.len() as u32, before };
+            self.encounters.soon().iter().for_each(|&grain| sharing.fetch(grain));
+            let event = Happened { time, encounter, told: log.records.len() as u32 };
+            let number = log.events.len() as u32;
             if event.grains().any(|grain| sharing.is_shared(grain)) {
-                log.shared.push(log.events.len() as u32);
+                log.shared.push(number);
             }
             log.events.push(event);
+            log.flights.push(self.encounters.before());
+            let grains = event.both();
             if !self.rows.is_empty() {
                 log.rows.push(grains.map(|grain| self.rows[grain as usize]));
             }
+            let carried = grains.map(|grain| Carried::by(&self.grains[grain as usize]));
             self.resolve(time, encounter, log)?;
-            for grain in event.grains() {
+            for (grain, carried) in event.grains().zip(carried) {
+                if Carried::by(&self.grains[grain as usize]) != carried {
+                    log.carried.push((number, grain, carried));
+                }
                 let flight = self.encounters.flight(grain);
                 log.fastest = log.fastest.max(sharing.speed(flight));
                 if sharing.belongs_to(half, grain) && sharing.may_change(half, grain, flight, time) {
@@ -70,14 +67,16 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     pub(super) fn undo(&mut self, log: &mut Log, first: usize, now: f64) {
         let mut changed: FxHashMap<u32, Flight> = FxHashMap::default();
         for number in (first..log.events.len()).rev() {
-            for (k, before) in log.events[number].befores().enumerate() {
-                changed.insert(before.grain, before.flight());
-                let grain = &mut self.grains[before.grain as usize];
-                (grain.spin, grain.hits) = (before.spin, before.hits);
+            for (k, (grain, flight)) in log.flights_of(number).enumerate() {
+                changed.insert(grain, flight);
                 if let Some(rows) = log.rows.get(number) {
-                    self.rows[before.grain as usize] = rows[k];
+                    self.rows[grain as usize] = rows[k];
                 }
             }
+        }
+        while let Some((_, grain, Carried { spin, hits })) = log.carried.pop_if(|(number, ..)| *number as usize >= first) {
+            let grain = &mut self.grains[grain as usize];
+            (grain.spin, grain.hits) = (spin, hits);
         }
         changed.keys().for_each(|&grain| self.lift(grain));
         for (&grain, flight) in &changed {
@@ -88,6 +87,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             log.records.truncate(event.told as usize);
         }
         log.events.truncate(first);
+        log.flights.truncate(first);
         log.rows.truncate(first);
         self.outrun = false;
         (self.mark, self.since_mark) = (now, 0);
