@@ -10,6 +10,7 @@
 mod cut;
 mod log;
 mod sharing;
+mod together;
 mod window;
 
 use std::ops::ControlFlow;
@@ -19,6 +20,7 @@ use impinge_events::{Flight, Surface};
 
 use self::log::{Happened, Log};
 use self::sharing::Sharing;
+use self::together::{alone, both};
 use super::collapse::Row;
 use super::{EventDriven, snapshot_of};
 use crate::grains::{Grain, Snapshot};
@@ -218,7 +220,7 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
             Ok::<(), Broken>(())
         };
         let ([first, second], [for_first, for_second]) = (&mut self.halves, &mut self.renewals);
-        let (ours, theirs) = rayon::join(|| run(0, first, for_first), || run(1, second, for_second));
+        let (ours, theirs) = both(|| run(0, first, for_first), || run(1, second, for_second));
         if ours.is_err() || theirs.is_err() || self.halves.iter().any(|half| half.log.outrun) {
             return self.run_alone(until, observer);
         }
@@ -229,7 +231,7 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
         }
         self.turn_back(from + self.sharing.safe_for(self.sharing.fastest));
         let [first, second] = &self.halves;
-        if let Some((counts, time)) = self.sharing.disagreement([&first.log, &second.log]) {
+        if let Some((counts, time)) = alone(|| self.sharing.disagreement([&first.log, &second.log])) {
             self.undo(counts, time);
         }
         let halves = &self.halves;
@@ -267,7 +269,7 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
     fn undo(&mut self, counts: [usize; 2], now: f64) {
         let [first, second] = &mut self.halves;
         let back = |Half { engine, log }: &mut Half<S, C>, count| engine.undo(log, count, now);
-        rayon::join(|| back(first, counts[0]), || back(second, counts[1]));
+        both(|| back(first, counts[0]), || back(second, counts[1]));
         self.now = now;
     }
 
@@ -315,7 +317,7 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
             }
             (watched, fastest)
         };
-        let ((ours, our_fastest), (theirs, their_fastest)) = rayon::join(|| of(0), || of(1));
+        let ((ours, our_fastest), (theirs, their_fastest)) = both(|| of(0), || of(1));
         self.sharing.fastest = our_fastest.max(their_fastest);
         self.sharing.watch_only([&ours, &theirs]);
     }
@@ -330,8 +332,13 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
         if is_time || self.now < found_for {
             let ([first, second], sharing, now) = (&mut self.halves, &self.sharing, self.now);
             let find = |half, Half { engine, log }: &mut Half<S, C>| engine.find_changes(half, now, sharing, log);
-            rayon::join(|| find(0, first), || find(1, second));
+            both(|| find(0, first), || find(1, second));
         }
+        alone(|| self.renew_found());
+    }
+
+    /// Renews those copies that were found to have to change.
+    fn renew_found(&mut self) {
         for half in 0..2 {
             let to_change = self.halves[half].log.to_change.iter().copied();
             for grain in to_change.filter(|&grain| !self.sharing.is_wrong(grain)).collect::<Vec<_>>() {
@@ -370,7 +377,7 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
             engine.begin(after, length);
         };
         let ([first, second], [for_first, for_second]) = (&mut self.halves, &mut self.renewals);
-        rayon::join(|| start(first, for_first), || start(second, for_second));
+        both(|| start(first, for_first), || start(second, for_second));
         self.now = 0.0;
         self.sharing.surveyed_until = 0.0;
         self.renew_copies(0.0);
@@ -415,7 +422,7 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
             engine.encounters.keep_only(known, everywhere, now);
         };
         let [first, second] = &mut self.halves;
-        rayon::join(|| keep(0, &mut first.engine), || keep(1, &mut second.engine));
+        both(|| keep(0, &mut first.engine), || keep(1, &mut second.engine));
         self.survey();
     }
 
