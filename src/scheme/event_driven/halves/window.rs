@@ -74,7 +74,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
                 }
             }
         }
-        while let Some((_, grain, Carried { spin, hits })) = log.carried.pop_if(|(number, ..)| *number as usize >= first) {
+        while let Some((_, grain, Carried { spin, hits })) =
+            log.carried.pop_if(|(number, ..)| *number as usize >= first)
+        {
             let grain = &mut self.grains[grain as usize];
             (grain.spin, grain.hits) = (spin, hits);
         }
