@@ -8,7 +8,7 @@ use super::{Calendar, Event, Kind, Plan, never};
 use crate::blocks::Blocks;
 use crate::prefetch::prefetch;
 
-/// Buckets for each event: as many as hold most of the waiting times when about one event is in each.
+/// Buckets for each event: a turn of them is about as long as most events wait when one comes in each.
 const BUCKETS_PER_EVENT: usize = 1;
 /// The buckets are laid out anew when fewer events than this part of their number have come in a turn, or more than so many times their number in one of
 /// so many parts of it; where there are few buckets, more than that.
@@ -18,12 +18,12 @@ const PARTS_OF_TURN: i64 = 16;
 const FEWEST_IN_A_CROWD: usize = 256;
 /// Buckets are no narrower than this part of what the median of the waiting times would make them: or a turn of them would be too short.
 const NARROWEST: f64 = 1.0 / 64.0;
-/// So many buckets before theirs it is said who comes; about half as many events come until then.
+/// So many buckets before theirs it is said who comes; about as many events come until then.
 const ANNOUNCED: i64 = 24;
-/// So many buckets before that the first owner in each is fetched from memory.
+/// So many buckets before that the owners in each are fetched from memory.
 const FETCHED: i64 = 8;
-/// From so many buckets on their lists do not fit the caches: an owner enters one that is at least so many ahead only after some others, once its first owner has
-/// come from memory.
+/// From so many buckets on their lists do not fit the nearest caches: an owner enters one that is at least so many ahead only after some others, once the list
+/// has come from memory.
 const MANY: usize = 1 << 14;
 const FAR: i64 = 64;
 const _: () = assert!(FAR / 2 > ANNOUNCED);
@@ -33,8 +33,9 @@ const MOST_WAITING: usize = 4;
 /// A calendar in which an owner is rescheduled in a time that does not grow with the number of owners.
 ///
 /// Events that come later than the present bucket of time wait in lists without an order, one for each of the next buckets (a turn of them); those that come
-/// after the turn are in no list, and are looked for when the next one begins. When a bucket becomes the present one its events go into a heap, and so do those that are
-/// scheduled into it from then on. About one event is in a bucket, so the heap is all but empty. Should thousands come at once, it is a heap still.
+/// after the turn are in no list, and are looked for when the next one begins. Whoever is rescheduled enters another list and stays in the one it was in: that is found
+/// out when its bucket becomes the present one. Then the events of this bucket go into a heap, and so do those that are scheduled into it from then on. About one
+/// event is in a bucket, so the heap is all but empty. Should thousands come at once, it is a heap still.
 #[derive(Clone, Debug)]
 pub struct Buckets {
     owners: Vec<Owner>,
