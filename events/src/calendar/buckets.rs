@@ -10,6 +10,8 @@ use crate::prefetch::prefetch;
 
 /// Buckets for each event: a turn of them is about as long as most events wait when one comes in each.
 const BUCKETS_PER_EVENT: usize = 1;
+/// Half as many where there are more events than these: it costs no time there, and memory counts.
+const MOST_FINE: usize = 1 << 17;
 /// The buckets are laid out anew when fewer events than this part of their number have come in a turn, or more than so many times their number in one of
 /// so many parts of it; where there are few buckets, more than that.
 const FEWEST_EVENTS: f64 = 0.25;
@@ -280,7 +282,8 @@ impl Buckets {
         let until_median = (0.5 * count as f64 / (median - self.origin)).min(f64::MAX);
         let lately = self.rate * (self.passed - self.part.1) as f64 / ((self.now - self.part.0) as f64 + 1.0);
         self.rate = lately.clamp(until_median, until_median / NARROWEST).min(f64::MAX);
-        self.lists.reset((BUCKETS_PER_EVENT * count).next_power_of_two());
+        let coarse = usize::from(count > MOST_FINE);
+        self.lists.reset((BUCKETS_PER_EVENT * count).next_power_of_two() >> coarse);
         self.present.clear();
         (self.now, self.turn, self.announced) = (0, 0, 0);
         (self.waiting, self.passed, self.passed_before, self.part) = (0, 0, 0, (0, 0));

@@ -413,6 +413,9 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     }
 
     fn fill_cells(&mut self, mut cells: Cells, now: f64) {
+        // The old ones go first, so that their memory serves again.
+        self.neighbors = Neighbors::Nobody;
+        cells.reserve(self.flights.len());
         for grain in self.inside() {
             cells.insert(grain, self.flight(grain), now);
         }

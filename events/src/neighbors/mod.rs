@@ -337,6 +337,11 @@ impl Cells {
         Place { cell, number, edges, turned }
     }
 
+    /// Makes room for the places of grains 0 to `grains` - 1, and no more.
+    pub(crate) fn reserve(&mut self, grains: usize) {
+        self.places.reserve_exact(grains.saturating_sub(self.places.len()));
+    }
+
     /// Puts grain `id` into the cell where it is at `now` (s, epoch time).
     pub(crate) fn insert(&mut self, id: u32, flight: &Flight, now: f64) {
         if self.places.len() <= id as usize {
