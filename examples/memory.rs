@@ -33,7 +33,8 @@ const MOST: f64 = 600.0;
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     if let [grains, cores, fraction] = &arguments[..] {
-        let (grains, cores, fraction) = (grains.parse()?, cores.parse()?, fraction.parse()?);
+        let number = |text: &String| text.parse::<f64>().map_err(|_| format!("`{text}` is not a number"));
+        let (grains, cores, fraction) = (number(grains)? as u32, number(cores)? as usize, number(fraction)?);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(cores).build()?;
         return Ok(pool.install(|| measure(grains, cores, fraction).map_err(|error| error.to_string()))?);
     }
