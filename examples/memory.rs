@@ -33,7 +33,10 @@ const MOST: f64 = 600.0;
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     if let [grains, cores, fraction] = &arguments[..] {
-        let number = |text: &String| text.parse::<f64>().map_err(|_| format!("`{text}` is not a number"));
+        let number = |text: &String| {
+            let number = text.parse::<f64>().ok().filter(|&number| number >= 0.0);
+            number.ok_or_else(|| format!("`{text}` is not a number from 0 on"))
+        };
         let (grains, cores, fraction) = (number(grains)? as u32, number(cores)? as usize, number(fraction)?);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(cores).build()?;
         return Ok(pool.install(|| measure(grains, cores, fraction).map_err(|error| error.to_string()))?);
@@ -69,7 +72,10 @@ fn measure(grains: u32, cores: usize, fraction: f64) -> Result<(), Box<dyn Error
     let peak = (memory("VmHWM")? - before) / grains;
     let each = (after - before) / grains;
     println!("{grains:9} {fraction:8} {name:>6} {each:17.0} {peak:17.0}");
-    assert!(each <= MOST * cores.max(1) as f64, "{each:.0} bytes a grain");
+    let most = MOST * cores.max(1) as f64;
+    if each > most {
+        return Err(format!("that is more than {most:.0} bytes a grain").into());
+    }
     Ok(())
 }
 

@@ -139,6 +139,13 @@ impl Default for Buckets {
     }
 }
 
+/// The bucket of a time (s), counted from `origin` (s), where there are `rate` in a second.
+#[inline]
+fn bucket_of(time: f64, origin: f64, rate: f64) -> i64 {
+    // Saturates. Times before the origin are in negative buckets, all of which are past.
+    ((time - origin) * rate) as i64
+}
+
 impl Buckets {
     /// How many buckets are in a turn: a power of two.
     #[inline]
@@ -149,8 +156,7 @@ impl Buckets {
     /// The bucket of a time.
     #[inline]
     fn bucket(&self, time: f64) -> i64 {
-        // Saturates. Times before the origin are in negative buckets, all of which are past.
-        ((time - self.origin) * self.rate) as i64
+        bucket_of(time, self.origin, self.rate)
     }
 
     /// The list of a bucket.
@@ -219,7 +225,7 @@ impl Buckets {
             self.lists.drain(list, |owner| {
                 *waiting -= 1;
                 let event = self.owners[owner as usize].event;
-                if ((event.time - self.origin) * self.rate) as i64 == self.now {
+                if bucket_of(event.time, self.origin, self.rate) == self.now {
                     *passed += 1;
                     self.present.push(Entry { event, owner });
                 }

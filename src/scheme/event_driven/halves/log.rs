@@ -45,7 +45,7 @@ impl Happened {
     }
 
     /// The two grains that took part; twice the same where it was one.
-    pub(super) fn both(&self) -> [u32; 2] {
+    pub(super) fn pair(&self) -> [u32; 2] {
         match self.encounter {
             Encounter::Grains { a, b } => [a, b],
             Encounter::Surface { grain, .. } | Encounter::Exit { grain } => [grain; 2],
@@ -54,7 +54,7 @@ impl Happened {
 
     /// Each grain that took part.
     pub(super) fn grains(&self) -> impl Iterator<Item = u32> + use<> {
-        let [first, second] = self.both();
+        let [first, second] = self.pair();
         [first, second].into_iter().take(if first == second { 1 } else { 2 })
     }
 }

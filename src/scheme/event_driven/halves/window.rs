@@ -30,7 +30,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             }
             log.events.push(event);
             log.flights.push(self.encounters.before());
-            let grains = event.both();
+            let grains = event.pair();
             if !self.rows.is_empty() {
                 log.rows.push(grains.map(|grain| self.rows[grain as usize]));
             }
