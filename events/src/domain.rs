@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::Flight;
+use crate::calendar::earlier;
 
 /// The region in which grains are followed.
 ///
@@ -46,11 +47,10 @@ impl Domain {
             for &axis in self.axes() {
                 let (x, v) = (flight.position[axis], flight.velocity[axis]);
                 let side = if v > 0.0 { self.max[axis] } else { self.min[axis] };
-                // A grain at rest along this axis gives 0/0 or x/0: neither is less than anything.
-                let time = flight.time + ((side - x) / v).max(0.0);
-                if v != 0.0 && time < exit {
-                    exit = time;
-                }
+                let wait = (side - x) / v;
+                // A grain beyond the side leaves at once. One at rest along this axis gives 0/0 or x/0, and never does.
+                let time = flight.time + if wait > 0.0 { wait } else { 0.0 };
+                exit = earlier(if v == 0.0 { f64::INFINITY } else { time }, exit);
             }
         }
         exit

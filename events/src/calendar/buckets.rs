@@ -21,7 +21,7 @@ const FEWEST_IN_A_CROWD: usize = 256;
 /// Buckets are no narrower than this part of what the median of the waiting times would make them: or a turn of them would be too short.
 const NARROWEST: f64 = 1.0 / 64.0;
 /// So many buckets before theirs it is said who comes; about as many events come until then.
-const ANNOUNCED: i64 = 24;
+const ANNOUNCED: i64 = 8;
 /// So many buckets before that the owners in each are fetched from memory.
 const FETCHED: i64 = 8;
 /// From so many buckets on their lists do not fit the nearest caches: an owner enters one that is at least so many ahead only after some others, once the list

@@ -12,7 +12,7 @@ mod staging;
 pub use buckets::Buckets;
 pub use plain::PlainCalendar;
 pub use plan::Plan;
-pub(crate) use plan::{NOBODY, never};
+pub(crate) use plan::{NOBODY, earlier, never};
 
 use std::cmp::Ordering;
 

@@ -9,6 +9,12 @@ pub(crate) const fn never(kind: Kind) -> Event {
     Event { time: f64::INFINITY, kind, partner: NOBODY }
 }
 
+/// The earlier of two times, none of which is NaN: one instruction, where `f64::min` takes five.
+#[inline]
+pub(crate) fn earlier(one: f64, other: f64) -> f64 {
+    if one < other { one } else { other }
+}
+
 /// The earliest of each sort of event that lies before an owner. Only the first of them is in the calendar; the calendar keeps the rest for
 /// [`Encounters`](crate::Encounters) and knows nothing of it.
 #[derive(Clone, Copy, Debug)]
@@ -113,7 +119,7 @@ impl Plan {
     /// The first of the three; they stand in the order of their kinds, so the earlier one wins where times are equal.
     #[inline]
     pub(crate) fn first(&self) -> Event {
-        let time = self.pair_time.min(self.side_time);
+        let time = earlier(self.pair_time, self.side_time);
         if self.crossing_time <= time {
             self.crossing()
         } else if self.pair_time <= self.side_time {

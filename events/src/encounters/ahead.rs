@@ -49,40 +49,50 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         if self.flights.len() < FEWEST_GRAINS {
             return;
         }
-        let Neighbors::Cells(cells) = &self.neighbors else { return };
         let mut coming = std::mem::take(&mut self.ahead.coming);
         self.calendar.coming(&mut coming);
         for owner in coming.drain(..) {
-            self.ahead.note(owner);
-            prefetch(&self.flights, owner as usize);
-            cells.fetch_place(owner);
-            let partner = self.calendar.plan(owner).pair().partner;
-            self.calendar.fetch(partner);
-
-            let region = |owner: u32, first: Event| {
-                cells.region_of_next_search(owner, (first.kind == Kind::Crossing).then_some(first.partner as u8))
-            };
-            let owner = self.ahead.before_last(BETWEEN_STAGES);
             let first = self.calendar.plan(owner).first();
-            if !matches!(first.kind, Kind::Crossing | Kind::Review) {
-                self.ahead.meeting.push(owner);
-            }
-            if let Some(region) = region(owner, first) {
-                cells.fetch_cells(region);
-            }
-            if first.kind == Kind::Crossing {
-                cells.fetch_old_and_new(owner, first.partner as u8);
-            }
-            let owner = self.ahead.before_last(2 * BETWEEN_STAGES);
-            if let Some(region) = region(owner, self.calendar.plan(owner).first()) {
-                cells.visit_first_in_cells(region, |grain| {
-                    prefetch(&self.flights, grain as usize);
-                    // A meeting with it counts only if it comes before what it has planned.
-                    self.calendar.fetch(grain);
-                });
+            self.fetch_for(owner);
+            if first.kind == Kind::Grains {
+                // The calendar names one of the two.
+                self.calendar.fetch(first.partner);
+                self.fetch_for(first.partner);
             }
         }
         self.ahead.coming = coming;
+    }
+
+    /// Takes a grain that comes soon into the first stage, and others into the next ones.
+    #[inline]
+    fn fetch_for(&mut self, owner: u32) {
+        let Neighbors::Cells(cells) = &self.neighbors else { return };
+        self.ahead.note(owner);
+        prefetch(&self.flights, owner as usize);
+        cells.fetch_place(owner);
+
+        let region = |owner: u32, first: Event| {
+            cells.region_of_next_search(owner, (first.kind == Kind::Crossing).then_some(first.partner as u8))
+        };
+        let owner = self.ahead.before_last(BETWEEN_STAGES);
+        let first = self.calendar.plan(owner).first();
+        if !matches!(first.kind, Kind::Crossing | Kind::Review) {
+            self.ahead.meeting.push(owner);
+        }
+        if let Some(region) = region(owner, first) {
+            cells.fetch_cells(region);
+        }
+        if first.kind == Kind::Crossing {
+            cells.fetch_old_and_new(owner, first.partner as u8);
+        }
+        let owner = self.ahead.before_last(2 * BETWEEN_STAGES);
+        if let Some(region) = region(owner, self.calendar.plan(owner).first()) {
+            cells.visit_first_in_cells(region, |grain| {
+                prefetch(&self.flights, grain as usize);
+                // A meeting with it counts only if it comes before what it has planned.
+                self.calendar.fetch(grain);
+            });
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::calendar::{Buckets, Calendar, Event, Kind, NOBODY, Plan, never};
+use crate::calendar::{Buckets, Calendar, Event, Kind, NOBODY, Plan, earlier, never};
 use crate::lists::Lists;
 use crate::neighbors::{Cells, Near};
 use crate::{Bend, Domain, Flight, NoSurface, Outlook, Surface};
@@ -44,6 +44,14 @@ pub enum Encounter {
 /// After so many crossings a grain the layout of the cells is thought over.
 const CROSSINGS_PER_GRAIN: usize = 8;
 
+/// Among whom a partner is looked for.
+#[derive(Clone, Copy, Debug)]
+enum Among {
+    All,
+    /// Those of lower numbers, while all are looked at in turn.
+    Lower,
+}
+
 /// Who can meet whom.
 #[derive(Clone, Debug)]
 enum Neighbors {
@@ -63,6 +71,15 @@ impl Neighbors {
             Self::Nobody => {}
             Self::Cells(cells) => cells.add_around(grain, near),
             Self::Lists(lists) => near.beyond.extend_from_slice(lists.of(grain)),
+        }
+    }
+
+    /// The same without those in the lists whose numbers are higher: in cells, these are yet to be.
+    #[inline]
+    fn add_lower(&self, grain: u32, near: &mut Near) {
+        match self {
+            Self::Lists(lists) => near.beyond.extend(lists.of(grain).iter().filter(|&&(other, _)| other < grain)),
+            _ => self.add(grain, near),
         }
     }
 
@@ -139,7 +156,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     pub fn new(flights: Vec<Flight>, surface: S, domain: Domain) -> Self {
         let mut encounters = Self::without_pairs(flights, surface, domain);
         encounters.lay_out_cells(0.0);
-        encounters.predict_all();
+        encounters.predict_all(0.0);
         encounters
     }
 
@@ -147,7 +164,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     #[must_use]
     pub fn transparent(flights: Vec<Flight>, surface: S, domain: Domain) -> Self {
         let mut encounters = Self::without_pairs(flights, surface, domain);
-        encounters.predict_all();
+        encounters.predict_all(0.0);
         encounters
     }
 
@@ -215,7 +232,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
                 Kind::Crossing => self.cross(owner, event.time),
                 Kind::Review => {
                     self.calendar.plan_mut(owner).set_pair(never(Kind::Review));
-                    self.find_partner(owner);
+                    self.find_partner(owner, Among::All);
                     self.reschedule(owner);
                 }
                 Kind::Grains => {
@@ -316,7 +333,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             Neighbors::Nobody => self.predict(grain),
             _ => {
                 self.lay_out_cells(flight.time);
-                self.predict_all();
+                self.predict_all(flight.time);
             }
         }
         grain
@@ -402,23 +419,21 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
                 self.lay_out_cells(0.0);
             }
         }
-        self.predict_all();
+        self.predict_all(0.0);
     }
 
-    /// Lays out the cells for the grains as they are at `now`.
+    /// Lays out cells for the grains as they are at `now`, which are yet to enter them.
     fn lay_out_cells(&mut self, now: f64) {
         let (flights, largest) = self.flights_and_largest_radius();
         assert!(self.domain.holds(largest), "the periodic domain is less than eight grain radii wide");
-        self.fill_cells(Cells::new(self.domain, largest, self.everywhere, &flights, now), now);
+        self.take_cells(Cells::new(self.domain, largest, self.everywhere, &flights, now));
     }
 
-    fn fill_cells(&mut self, mut cells: Cells, now: f64) {
+    /// Takes cells in which nobody is yet.
+    fn take_cells(&mut self, mut cells: Cells) {
         // The old ones go first, so that their memory serves again.
         self.neighbors = Neighbors::Nobody;
         cells.reserve(self.flights.len());
-        for grain in self.inside() {
-            cells.insert(grain, self.flight(grain), now);
-        }
         self.neighbors = Neighbors::Cells(Box::new(cells));
         (self.crossings, self.looks) = (0, 0);
     }
@@ -438,23 +453,37 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             (self.crossings, self.looks) = (0, 0);
             return;
         };
-        self.fill_cells(better, now);
-        for grain in self.inside().collect::<Vec<_>>() {
-            self.plan_crossing(grain);
-            self.look_at_surface(grain);
-            self.find_partner(grain);
-            self.reschedule(grain);
+        self.take_cells(better);
+        for grain in 0..self.flights.len() as u32 {
+            if self.enter(grain, now) {
+                self.plan_crossing(grain);
+                self.look_at_surface(grain);
+                self.find_partner(grain, Among::Lower);
+                self.reschedule(grain);
+            }
         }
     }
 
-    fn predict_all(&mut self) {
+    /// Predicts everything from `now` on, where nobody is in the cells yet, if there are such. Each pair is looked at once, for the second of the two.
+    fn predict_all(&mut self, now: f64) {
         self.calendar.clear();
         for grain in 0..self.flights.len() as u32 {
             self.calendar.plan_mut(grain).set_pair(never(Kind::Review));
         }
-        for grain in self.inside().collect::<Vec<_>>() {
-            self.predict(grain);
+        for grain in 0..self.flights.len() as u32 {
+            if self.enter(grain, now) {
+                self.predict_among(grain, Among::Lower);
+            }
         }
+    }
+
+    /// Puts a grain into the cell where it is at `now`, if there are cells; gives false if it has been taken out.
+    fn enter(&mut self, grain: u32, now: f64) -> bool {
+        let flight = &self.flights[grain as usize];
+        if let (Neighbors::Cells(cells), false) = (&mut self.neighbors, is_vacant(flight)) {
+            cells.insert(grain, flight, now);
+        }
+        !is_vacant(flight)
     }
 
     /// Moves the state of a grain to `time`.
@@ -480,13 +509,18 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
 
     /// Predicts everything that lies before a grain whose motion has changed.
     fn predict(&mut self, grain: u32) {
+        self.predict_among(grain, Among::All);
+    }
+
+    #[inline(always)]
+    fn predict_among(&mut self, grain: u32, others: Among) {
         self.plan_crossing(grain);
         let exit = Event { time: self.domain.exit_time(self.flight(grain)), kind: Kind::Exit, partner: NOBODY };
         let plan = self.calendar.plan_mut(grain);
         plan.set_side(exit);
         plan.set_looked_until(f64::NEG_INFINITY);
         self.look_at_surface(grain);
-        self.find_partner(grain);
+        self.find_partner(grain, others);
         self.reschedule(grain);
     }
 
@@ -505,7 +539,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     #[inline]
     fn look_at_surface(&mut self, grain: u32) {
         let plan = self.calendar.plan_mut(grain);
-        let until = plan.crossing().time.min(self.horizon);
+        let until = earlier(plan.crossing().time, self.horizon);
         if !plan.has_to_look(until) {
             return;
         }
@@ -527,22 +561,23 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         }
     }
 
-    /// Finds the first grain that this one meets, among all that are near.
+    /// Finds the first grain that this one meets, among those of `others` that are near.
     #[inline]
-    fn find_partner(&mut self, grain: u32) {
-        let mut near = std::mem::take(&mut self.near);
-        near.clear();
-        self.neighbors.add(grain, &mut near);
-        self.looks += near.len();
-        let best = self.search(grain).first_among(&near);
-        self.near = near;
+    fn find_partner(&mut self, grain: u32, others: Among) {
+        self.near.clear();
+        match others {
+            Among::All => self.neighbors.add(grain, &mut self.near),
+            Among::Lower => self.neighbors.add_lower(grain, &mut self.near),
+        }
+        self.looks += self.near.len();
+        let best = self.search(grain).first_among(&self.near);
         self.plan_pair(grain, best);
     }
 
     #[inline]
     fn search(&self, grain: u32) -> Search<'_, C> {
-        let (flight, plan) = (self.flights[grain as usize], self.calendar.plan(grain));
-        let until = plan.pair().time.min(plan.side_time()).min(self.horizon);
+        let (flight, plan) = (&self.flights[grain as usize], self.calendar.plan(grain));
+        let until = earlier(earlier(plan.pair().time, plan.side_time()), self.horizon);
         Search {
             grain,
             flight,
@@ -575,7 +610,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         let event = plan.pair();
         plan.set_pair(never(Kind::Review));
         if event.kind == Kind::Grains {
-            let review = Event { kind: Kind::Review, partner: 0, ..event };
+            let review = Event { kind: Kind::Review, partner: NOBODY, ..event };
             self.calendar.plan_mut(event.partner).set_pair(review);
             self.reschedule(event.partner);
         }
@@ -595,13 +630,11 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         let (side, mut best) = (plan.crossing().partner as u8, plan.pair());
         if let Neighbors::Cells(cells) = &mut self.neighbors {
             cells.cross(grain, side);
-            let mut near = std::mem::take(&mut self.near);
-            near.clear();
-            cells.add_ahead(grain, side, &mut near);
-            if near.len() > 0 {
-                best = self.search(grain).first_among(&near);
+            self.near.clear();
+            cells.add_ahead(grain, side, &mut self.near);
+            if self.near.len() > 0 {
+                best = self.search(grain).first_among(&self.near);
             }
-            self.near = near;
         }
         self.plan_crossing(grain);
         self.look_at_surface(grain);
@@ -613,7 +646,9 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     #[inline(never)]
     fn reschedule(&mut self, grain: u32) {
         let first = self.calendar.plan(grain).first();
-        if first.time > self.horizon {
+        // A meeting is in the calendar once, with the lower of the two.
+        let kept_by_partner = first.kind == Kind::Grains && first.partner < grain;
+        if kept_by_partner || first.time > self.horizon {
             self.calendar.cancel(grain);
         } else {
             self.calendar.schedule(grain, first);

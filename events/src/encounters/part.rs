@@ -50,7 +50,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         if !matches!(self.neighbors, Neighbors::Nobody) {
             self.lay_out_cells(now);
         }
-        self.predict_all();
+        self.predict_all(now);
     }
 
     /// Takes a grain out for somebody else to know.

@@ -16,7 +16,7 @@ const PART: usize = 32;
 /// A search for the first grain that `grain` meets.
 pub(super) struct Search<'a, C> {
     pub(super) grain: u32,
-    pub(super) flight: Flight,
+    pub(super) flight: &'a Flight,
     /// Later meetings do not count, s.
     pub(super) until: f64,
     /// How far chords depart from paths (m), where grains press against each other.
@@ -37,7 +37,7 @@ impl<C: Calendar> Search<'_, C> {
     #[inline]
     pub(super) fn first_among(mut self, near: &Near) -> Event {
         // Of these the compiler knows that they stay as they are.
-        let (ours, flights) = (self.flight, self.flights);
+        let (ours, flights) = (*self.flight, self.flights);
         let (here, mut left) = near.here();
         for part in here.chunks(PART) {
             let mut in_reach = 0;
@@ -72,9 +72,9 @@ impl<C: Calendar> Search<'_, C> {
         let theirs = &self.flights[other as usize];
         let met = if let Some(sag) = self.sag {
             let slack = YIELDING * self.flight.radius.min(theirs.radius) + sag;
-            sphere_sphere_yielding(&self.flight, theirs, shift, slack, self.horizon)
+            sphere_sphere_yielding(self.flight, theirs, shift, slack, self.horizon)
         } else {
-            sphere_sphere(&self.flight, theirs, shift)
+            sphere_sphere(self.flight, theirs, shift)
         };
         let Some(time) = met else { return };
         if time > self.until {

@@ -178,6 +178,6 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             self.domain.wrap(&mut flight.position);
         }
         self.lay_out_cells(now);
-        self.predict_all();
+        self.predict_all(now);
     }
 }
