@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::slots::{cells_of_period, slots};
+use super::slots::{cells_of_period, hashed_slots, slots};
 use crate::{Domain, Flight};
 
 /// A cell is wider than the largest contact distance by this fraction, so that a crossing that is late by rounding cannot
@@ -13,13 +13,24 @@ pub(super) const FEWEST_PERIODIC_CELLS: i32 = 4;
 /// No grain stands so many cells from the corner when the grid is laid out: the numbers of cells (below 2^31) then last for an epoch.
 const FARTHEST_CELL: f64 = (1u32 << 29) as f64;
 
-/// Steps between the numbers of cells that are adjacent along x, y and z where there is no period. Odd fractions of 2^32 without a pattern
-/// (2^32 over the golden ratio, and over its square root) scatter the rows over the slots; along x cells stay side by side in memory.
-const SCATTERED: [u32; 3] = [1, 0x9E37_79B1, 0xC949_57E9];
-
 /// Width of the smallest cells that grains up to this radius (m) may have, m.
 pub(super) fn contact_width(largest_radius: f64) -> f64 {
     2.0 * largest_radius * (1.0 + CELL_MARGIN)
+}
+
+/// So many times as wide along x (and y) as along z is the box of cells before a hashed table begins anew, if it had the form of a cube: a spray is wide and flat.
+const WIDER: f64 = std::f64::consts::SQRT_2;
+/// By this part of a layer the table is shifted where it begins anew: so a column of cells does not meet itself.
+const SHIFT: f64 = 0.382;
+
+/// Steps between the numbers of cells that are adjacent along x, y and z where there is no period, for a table of so many slots: row by row, layer by layer. So a grain
+/// shares its slot with others that are as far away as can be, and not with those that a hash happens to choose: most of them are where nobody is.
+fn strides_of_hash(planar: bool, slots: usize) -> [u32; 3] {
+    let slots = slots as f64;
+    let row = if planar { 1.0 } else { (WIDER * slots.cbrt()).round() };
+    let wanted = if planar { WIDER * slots.sqrt() } else { row * row };
+    let layer = (slots / ((slots / wanted).floor() + SHIFT)).round();
+    [1, row as u32, layer as u32]
 }
 
 /// Size and motion of the grid.
@@ -103,7 +114,7 @@ impl Layout {
             // In a planar scene there is nothing along y, and what is never looked at is in range nevertheless.
             [1, if y > 0 { x } else { 0 }, x * y.max(1)]
         } else {
-            SCATTERED
+            strides_of_hash(domain.planar, hashed_slots(grains))
         };
         Self {
             size,
@@ -200,4 +211,29 @@ impl Flow {
 fn quantile(values: &mut [f64], part: f64) -> f64 {
     let rank = ((values.len() - 1) as f64 * part) as usize;
     *values.select_nth_unstable_by(rank, f64::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A hash that scattered the cells let grains share slots with those of any other cell: a fifth of all that a jet looked at were such strangers. Now none of them is
+    /// near, whatever the size of the table.
+    #[test]
+    fn cells_that_share_a_slot_are_far_apart() {
+        for (planar, bits) in (8..22).map(|bits| (false, bits)).chain((8..22).map(|bits| (true, bits))) {
+            let slots = 1i64 << bits;
+            let [_, row, layer] = strides_of_hash(planar, slots as usize).map(i64::from);
+            let spacing = if planar { (slots as f64).sqrt() } else { (slots as f64).cbrt() };
+            let near = spacing as i64;
+            for y in if planar { 0..=0 } else { -near..=near } {
+                for z in -near..=near {
+                    // The nearest cells along x with the slot of cell (0, 0, 0).
+                    let beside = (row * y + layer * z + slots / 2).rem_euclid(slots) - slots / 2;
+                    let apart = Vector3::new(beside, y, z).map(|cells| cells as f64).norm();
+                    assert!(apart == 0.0 || apart > 0.6 * spacing, "2^{bits} slots: ({beside}, {y}, {z})");
+                }
+            }
+        }
+    }
 }

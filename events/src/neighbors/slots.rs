@@ -20,6 +20,11 @@ pub(super) fn slots(grains: usize) -> usize {
     (SLOTS_PER_GRAIN * grains).max(FEWEST).next_power_of_two()
 }
 
+/// How many slots the hashed table for so many grains has: a power of two.
+pub(super) fn hashed_slots(grains: usize) -> usize {
+    if grains > MOST_SPARSE { slots(grains) } else { SPARSE * slots(grains) }
+}
+
 /// Into how many cells a period is cut for so many grains, at most.
 pub(super) fn cells_of_period(grains: usize) -> usize {
     if grains > MOST_SPARSE { CELLS_PER_GRAIN * grains } else { slots(grains) }
@@ -58,7 +63,7 @@ impl Slots {
             // The first and the last slot have none beside them.
             Some(cells) => (cells + 2, usize::MAX),
             None => {
-                let slots = if grains > MOST_SPARSE { slots(grains) } else { SPARSE * slots(grains) };
+                let slots = hashed_slots(grains);
                 (slots, slots - 1)
             }
         };
