@@ -4,7 +4,7 @@ use bvh::aabb::{Aabb, Bounded};
 use bvh::bounding_hierarchy::BHShape;
 use bvh::bvh::{Bvh, BvhNode};
 use impinge_events::contact_time::Sweep;
-use impinge_events::{Mesh, Outlook};
+use impinge_events::{Mesh, Outlook, prefetch};
 use nalgebra::{Point3, Vector3};
 
 /// By how much (relative to coordinates and radii) boxes are widened, so that rounding never hides a triangle.
@@ -127,6 +127,15 @@ impl Index {
         [(boxes[0].bounds(), children[0]), (boxes[1].bounds(), children[1])]
     }
 
+    /// Asks the memory for a node or a triangle, which comes while it is found out whether it is needed.
+    #[inline]
+    fn fetch(&self, child: Child) {
+        match child.triangle() {
+            Some(triangle) => self.mesh.fetch(triangle),
+            None => prefetch(&self.nodes, child.0 as usize),
+        }
+    }
+
     pub(super) fn mesh(&self) -> &Mesh {
         &self.mesh
     }
@@ -247,13 +256,22 @@ fn crossing([a, b, c]: [Vector3<f64>; 3], point: &Vector3<f64>, direction: &Vect
     if inside.abs() > TOO_CLOSE { Some(inside > 0.0 && ahead) } else { (!ahead).then_some(false) }
 }
 
+/// The lesser of two numbers: one instruction, unlike `f64::min`, which looks for NaN. Where the first is none (a flight along a side of a box), the second stands.
+#[inline]
+fn lesser(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The greater of two numbers, likewise.
+#[inline]
+fn greater(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
 /// When a point that sets off from `point` with velocity 1 / `inverse` enters and leaves a box widened by `margin`; entering
 /// never, at infinity, when it misses it.
 #[inline]
 fn passage(bounds: &Aabb<f64, 3>, margin: f64, point: &Vector3<f64>, inverse: &Vector3<f64>) -> (f64, f64) {
-    // One instruction each, unlike those that look for NaN (a flight along a side of the box): where the first is none, the second stands.
-    let lesser = |a: f64, b: f64| if a < b { a } else { b };
-    let greater = |a: f64, b: f64| if a > b { a } else { b };
     let (mut enter, mut leave) = (0.0f64, f64::INFINITY);
     for axis in 0..3 {
         let low = (bounds.min[axis] - margin - point[axis]) * inverse[axis];
@@ -270,6 +288,8 @@ struct Search<'a> {
     sweep: &'a Sweep,
     /// One over the velocity, component by component.
     inverse: Vector3<f64>,
+    /// Magnitude of the velocity.
+    speed: f64,
     /// The radius and what rounding may hide, m.
     margin: f64,
     /// The first contact so far, or the end of the search, s.
@@ -284,7 +304,8 @@ impl<'a> Search<'a> {
     fn new(index: &'a Index, sweep: &'a Sweep, until: f64) -> Self {
         let margin = sweep.radius + BOX_SLACK * (sweep.radius + sweep.position.amax());
         let inverse = sweep.velocity.map(|component| 1.0 / component);
-        Self { index, sweep, inverse, margin, time: until, element: None, end: None }
+        let speed = sweep.velocity.norm();
+        Self { index, sweep, inverse, speed, margin, time: until, element: None, end: None }
     }
 
     #[inline]
@@ -306,7 +327,7 @@ impl<'a> Search<'a> {
         if away <= self.margin * self.margin {
             return enter;
         }
-        let earliest = enter + (away.sqrt() - self.margin) / self.sweep.velocity.norm();
+        let earliest = enter + (away.sqrt() - self.margin) / self.speed;
         if earliest <= leave { earliest } else { f64::INFINITY }
     }
 
@@ -327,7 +348,9 @@ impl<'a> Search<'a> {
         if let Some(triangle) = node.triangle() {
             return self.try_triangle(triangle);
         }
-        let [left, right] = self.index.below(node).map(|(bounds, child)| (self.earliest(&bounds), child, bounds));
+        let below = self.index.below(node);
+        below.iter().for_each(|&(_, child)| self.index.fetch(child));
+        let [left, right] = below.map(|(bounds, child)| (self.earliest(&bounds), child, bounds));
         let children = if right.0 < left.0 { [right, left] } else { [left, right] };
         for (earliest, child, bounds) in children {
             let in_time = earliest.is_finite() && self.sweep.time(earliest) <= self.time;
@@ -354,7 +377,7 @@ impl<'a> Search<'a> {
 /// Vector from the nearest point of a box to `point`; zero inside.
 #[inline]
 fn from_box(bounds: &Aabb<f64, 3>, point: &Vector3<f64>) -> Vector3<f64> {
-    point - point.inf(&bounds.max.coords).sup(&bounds.min.coords)
+    Vector3::from_fn(|axis, _| point[axis] - greater(lesser(point[axis], bounds.max[axis]), bounds.min[axis]))
 }
 
 #[cfg(test)]
