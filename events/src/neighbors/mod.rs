@@ -2,7 +2,7 @@
 //!
 //! A grain can only touch grains in its own cell and the cells around it until it leaves its cell. The grid of cells moves at
 //! a constant velocity, so grains that fly side by side at that velocity never cross a cell. The grid has no bounds: cells
-//! are hashed into slots, so memory follows the grains and not the domain; grains of another cell that share a slot are
+//! are numbered row by row and share slots far apart, so memory follows the grains and not the domain; grains of another cell that share a slot are
 //! looked at in vain. In a periodic domain a whole number of cells tiles the period, and each has a slot of its own.
 //!
 //! Cells are bookkeeping: neither their size nor their drift can change a bit of a prediction.
