@@ -668,3 +668,27 @@ const VACANT: Flight = Flight {
 fn is_vacant(flight: &Flight) -> bool {
     flight.radius == 0.0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where all was predicted anew each of two looked at the other, and their meeting stood in the calendar twice.
+    #[test]
+    fn two_that_will_meet_are_looked_at_once_and_stand_in_the_calendar_once() {
+        let ball = |x: f64, speed: f64| Flight {
+            position: Vector3::new(x, 0.0, 0.0),
+            time: 0.0,
+            velocity: Vector3::x() * speed,
+            radius: 0.5,
+        };
+        let mut balls =
+            Encounters::<NoSurface>::new(vec![ball(0.0, 1.0), ball(1.25, 0.0)], NoSurface, Domain::unbounded());
+        assert_eq!(balls.looks, 1);
+        let meeting = Event { time: 0.25, kind: Kind::Grains, partner: 1 };
+        assert_eq!(balls.calendar.plan(1).pair(), Event { partner: 0, ..meeting });
+        assert_eq!(balls.calendar.next(), Some((0, meeting)));
+        balls.calendar.cancel(0);
+        assert_ne!(balls.calendar.next().map(|(_, event)| event.kind), Some(Kind::Grains));
+    }
+}
