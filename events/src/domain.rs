@@ -3,7 +3,6 @@
 use nalgebra::Vector3;
 
 use crate::Flight;
-use crate::calendar::earlier;
 
 /// The region in which grains are followed.
 ///
@@ -50,7 +49,8 @@ impl Domain {
                 let wait = (side - x) / v;
                 // A grain beyond the side leaves at once. One at rest along this axis gives 0/0 or x/0, and never does.
                 let time = flight.time + if wait > 0.0 { wait } else { 0.0 };
-                exit = earlier(if v == 0.0 { f64::INFINITY } else { time }, exit);
+                let time = if v == 0.0 { f64::INFINITY } else { time };
+                exit = if time < exit { time } else { exit };
             }
         }
         exit

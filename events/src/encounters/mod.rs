@@ -512,6 +512,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         self.predict_among(grain, Among::All);
     }
 
+    // Each caller has its own, or every deflection would choose.
     #[inline(always)]
     fn predict_among(&mut self, grain: u32, others: Among) {
         self.plan_crossing(grain);

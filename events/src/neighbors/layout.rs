@@ -18,9 +18,10 @@ pub(super) fn contact_width(largest_radius: f64) -> f64 {
     2.0 * largest_radius * (1.0 + CELL_MARGIN)
 }
 
-/// So many times as wide along x (and y) as along z is the box of cells before a hashed table begins anew, if it had the form of a cube: a spray is wide and flat.
+/// The box of cells with which a hashed table is full, and begins anew, is so many times as wide along x (and y) as a cube of as many cells, and flatter along z: a spray is
+/// wide and flat, as a rule, and a surface across z. Others share a slot less far away.
 const WIDER: f64 = std::f64::consts::SQRT_2;
-/// By this part of a layer the table is shifted where it begins anew: so a column of cells does not meet itself.
+/// By this part of a layer the box above is shifted: so a column of cells does not meet itself, in any of the next few boxes, for this is the golden section.
 const SHIFT: f64 = 0.382;
 
 /// Steps between the numbers of cells that are adjacent along x, y and z where there is no period, for a table of so many slots: row by row, layer by layer. So a grain
