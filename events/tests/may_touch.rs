@@ -1,7 +1,7 @@
 //! The bound that spares most pairs their root never says no where there is a contact.
 
 use impinge_events::Flight;
-use impinge_events::contact_time::{sphere_sphere, spheres_may_touch, spheres_may_touch_two};
+use impinge_events::contact_time::{sphere_sphere, spheres_may_touch, spheres_may_touch_four};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
@@ -94,8 +94,10 @@ proptest! {
                 for until in [time, time + later * time.abs()] {
                     prop_assert!(spheres_may_touch(&a, &b, Vector3::zeros(), until), "{a:?}, {b:?}: {time} s");
                     // Whoever stands beside it, be it far away.
-                    for (two, bit) in [([&b, &far], 1), ([&far, &b], 2)] {
-                        prop_assert!(spheres_may_touch_two(&a, two, until) & bit != 0, "{a:?}, {b:?}: {time} s");
+                    for number in 0..4 {
+                        let mut four = [&far; 4];
+                        four[number] = &b;
+                        prop_assert!(spheres_may_touch_four(&a, four, until) >> number & 1 != 0, "{a:?}, {b:?}: {time} s");
                     }
                 }
             }
@@ -108,7 +110,7 @@ proptest! {
         let a = Flight { position: Vector3::zeros(), time: 0.0, velocity, radius: 0.4 };
         let b = Flight { position: place, ..a };
         prop_assert!(!spheres_may_touch(&a, &b, Vector3::zeros(), until));
-        prop_assert_eq!(spheres_may_touch_two(&a, [&b; 2], until), 0);
+        prop_assert_eq!(spheres_may_touch_four(&a, [&b; 4], until), 0);
     }
 
     /// The same for pairs that touch or overlap by rounding, approach and recede.
@@ -118,7 +120,7 @@ proptest! {
         let b = Flight { position: normal * (reach * (1.0 - overlap)), time, velocity, radius: 0.7 * reach };
         if let Some(time) = sphere_sphere(&a, &b, Vector3::zeros()) {
             prop_assert!(spheres_may_touch(&a, &b, Vector3::zeros(), time), "{a:?}, {b:?}");
-            prop_assert_eq!(spheres_may_touch_two(&a, [&b; 2], time), 0b11, "{:?}, {:?}", a, b);
+            prop_assert_eq!(spheres_may_touch_four(&a, [&b; 4], time), 0b1111, "{:?}, {:?}", a, b);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Sphere and sphere: Arbelaez, Zohdi & Dornfeld (2009), eq. (36) to (39).
 
 use nalgebra::Vector3;
-use wide::f64x2;
+use wide::f64x4;
 
 use super::grazing::{self, GRAZING};
 use super::wide::{Wide, WideVector};
@@ -95,23 +95,24 @@ pub fn spheres_may_touch(a: &Flight, b: &Flight, shift: Vector3<f64>, until: f64
     in_time & (on_course | (v2 < SMALLEST_SPEED_SQUARED))
 }
 
-/// [`spheres_may_touch`] for one sphere and two others at once: bit k tells of the k-th.
+/// [`spheres_may_touch`] for one sphere and four others at once: bit k tells of the k-th.
 #[inline]
 #[must_use]
-pub fn spheres_may_touch_two(a: &Flight, others: [&Flight; 2], until: f64) -> u32 {
-    let two = |of: fn(&Flight) -> f64| f64x2::from(others.map(of));
-    let dot = |a: [f64x2; 3], b: [f64x2; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    let velocity = [two(|b| b.velocity.x), two(|b| b.velocity.y), two(|b| b.velocity.z)];
-    let position = [two(|b| b.position.x), two(|b| b.position.y), two(|b| b.position.z)];
-    let later = a.time - two(|b| b.time);
-    let v: [f64x2; 3] = std::array::from_fn(|axis| velocity[axis] - a.velocity[axis]);
-    let r: [f64x2; 3] = std::array::from_fn(|axis| position[axis] + velocity[axis] * later - a.position[axis]);
-    let s = two(|b| b.radius) + a.radius;
+pub fn spheres_may_touch_four(a: &Flight, others: [&Flight; 4], until: f64) -> u32 {
+    let four = |of: fn(&Flight) -> f64| f64x4::from(others.map(of));
+    // Products are rounded with their sums or not, as the processor can: it is a bound.
+    let dot = |a: [f64x4; 3], b: [f64x4; 3]| a[2].mul_add(b[2], a[1].mul_add(b[1], a[0] * b[0]));
+    let velocity = [four(|b| b.velocity.x), four(|b| b.velocity.y), four(|b| b.velocity.z)];
+    let position = [four(|b| b.position.x), four(|b| b.position.y), four(|b| b.position.z)];
+    let later = a.time - four(|b| b.time);
+    let v: [f64x4; 3] = std::array::from_fn(|axis| velocity[axis] - a.velocity[axis]);
+    let r: [f64x4; 3] = std::array::from_fn(|axis| velocity[axis].mul_add(later, position[axis] - a.position[axis]));
+    let s = four(|b| b.radius) + a.radius;
     let (approach, v2, s2) = (-dot(r, v), dot(v, v), s * s);
     let separation = dot(r, r) * (1.0 - CAUTION) - s2 * (1.0 + CAUTION);
     let in_time = separation.simd_le(approach * (2.0 * (until - a.time)));
     let on_course = (v2 * separation).simd_le(approach * approach);
-    let unknown = v2.simd_lt(f64x2::splat(SMALLEST_SPEED_SQUARED));
+    let unknown = v2.simd_lt(f64x4::splat(SMALLEST_SPEED_SQUARED));
     (in_time & (on_course | unknown)).to_bitmask()
 }
 

@@ -4,14 +4,14 @@ use nalgebra::Vector3;
 
 use crate::Flight;
 use crate::calendar::{Calendar, Event, Kind};
-use crate::contact_time::{sphere_sphere, sphere_sphere_yielding, spheres_may_touch, spheres_may_touch_two};
+use crate::contact_time::{sphere_sphere, sphere_sphere_yielding, spheres_may_touch, spheres_may_touch_four};
 use crate::neighbors::Near;
 
 /// By this part of the smaller radius grains that touch under force may overlap before they meet again ([`sphere_sphere_yielding`]).
 pub const YIELDING: f64 = 1e-6;
 
-/// So many twos are looked at before going on with any: a bit each of 64.
-const PART: usize = 32;
+/// So many fours are looked at before going on with any: a bit each of 64.
+const PART: usize = 16;
 
 /// A search for the first grain that `grain` meets.
 pub(super) struct Search<'a, C> {
@@ -32,7 +32,7 @@ pub(super) struct Search<'a, C> {
 impl<C: Calendar> Search<'_, C> {
     /// The first meeting with one of `near` that comes before all that either of the two has planned, or else what this grain has planned.
     ///
-    /// Most of `near` are out of reach. To find out about two of them at once, and about all before going on with any, is the fastest way: which are in
+    /// Most of `near` are out of reach. To find out about four of them at once, and about all before going on with any, is the fastest way: which are in
     /// reach cannot be foretold, and a wrong guess costs a processor as much as a look.
     #[inline]
     pub(super) fn first_among(mut self, near: &Near) -> Event {
@@ -41,18 +41,18 @@ impl<C: Calendar> Search<'_, C> {
         let (here, mut left) = near.here();
         for part in here.chunks(PART) {
             let mut in_reach = 0;
-            for (number, two) in part.iter().enumerate() {
-                let theirs = two.map(|other| &flights[other as usize]);
-                in_reach |= u64::from(spheres_may_touch_two(&ours, theirs, self.until)) << (2 * number);
+            for (number, four) in part.iter().enumerate() {
+                let theirs = four.map(|other| &flights[other as usize]);
+                in_reach |= u64::from(spheres_may_touch_four(&ours, theirs, self.until)) << (4 * number);
             }
-            if left < 2 * part.len() {
-                // The last one has nobody beside it.
-                in_reach &= !(1 << left);
+            if left < 4 * part.len() {
+                // The last ones have nobody beside them.
+                in_reach &= (1 << left) - 1;
             }
-            left = left.saturating_sub(2 * PART);
+            left = left.saturating_sub(4 * PART);
             while in_reach != 0 {
                 let number = in_reach.trailing_zeros() as usize;
-                self.consider(part[number / 2][number % 2], Vector3::zeros());
+                self.consider(part[number / 4][number % 4], Vector3::zeros());
                 in_reach &= in_reach - 1;
             }
         }

@@ -56,10 +56,10 @@ impl Near {
         self.count + self.beyond.len()
     }
 
-    /// Those that are where their stored positions say, by twos, and how many they are: if that is odd, any grain stands beside the last.
+    /// Those that are where their stored positions say, by fours, and how many they are: beside the last any grains stand, to make four.
     #[inline]
-    pub(crate) fn here(&self) -> (&[[u32; 2]], usize) {
-        (&self.here.as_chunks().0[..self.count.div_ceil(2)], self.count)
+    pub(crate) fn here(&self) -> (&[[u32; 4]], usize) {
+        (&self.here.as_chunks().0[..self.count.div_ceil(4)], self.count)
     }
 
     /// All of them, with their shifts.
@@ -82,10 +82,10 @@ impl Near {
         self.count = count;
     }
 
-    /// Says that there are so many. What stands beside the last is a grain, if it is looked at with it.
+    /// Says that there are so many. What stands beside the last are grains, if they are looked at with it.
     #[inline]
     fn end_with(&mut self, count: usize) {
-        self.here[count] = 0;
+        self.here[count..count + 3].fill(0);
         self.count = count;
     }
 
@@ -567,7 +567,7 @@ impl Cells {
             let mut block = self.slots.first_block(centre.wrapping_add(offsets[around]));
             turned |= block.turned();
             while let Some(next) = self.slots.next_block(block) {
-                near.make_room(near.count + 4);
+                near.make_room(near.count + Block::ROOM + 3);
                 for other in next.grains().filter(|&other| other != id) {
                     near.here[near.count] = other;
                     near.end_with(near.count + 1);
