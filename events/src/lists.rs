@@ -108,6 +108,7 @@ mod tests {
 
     use super::*;
     use crate::Domain;
+    use crate::neighbors::Stream;
 
     /// Grains of radii up to 1 m in a box of `side` (m), in a stream of `drift` (m/s).
     fn scene(seed: u64, count: usize, side: f64, drift: Vector3<f64>) -> Vec<Flight> {
@@ -131,7 +132,7 @@ mod tests {
             let (min, max) = (Vector3::zeros(), Vector3::repeat(side));
             let domain = if periodic { Domain { min, max, periodic, planar: false } } else { Domain::unbounded() };
             let mut flights = scene(seed, count, side, Vector3::new(drift, 0.3 * drift, 0.0));
-            let Some(mut cells) = Cells::with_skin(domain, 1.0, skin, &flights, 0.0) else {
+            let Some(mut cells) = Cells::with_skin(domain, skin, &Stream::new(flights.iter(), 0.0)) else {
                 // The periodic domain is too small for the skin.
                 prop_assert!(periodic && side < 4.0 * (2.0 + skin) * 1.001);
                 return Ok(());
@@ -168,7 +169,7 @@ mod tests {
     #[test]
     fn a_list_holds_as_long_as_its_grain_keeps_to_its_room() {
         let flights = scene(1, 2, 9.0, Vector3::zeros());
-        let mut cells = Cells::with_skin(Domain::unbounded(), 1.0, 0.5, &flights, 0.0).expect("cells");
+        let mut cells = Cells::with_skin(Domain::unbounded(), 0.5, &Stream::new(flights.iter(), 0.0)).expect("cells");
         (0..).zip(&flights).for_each(|(grain, flight)| cells.insert(grain, flight, 0.0));
         let lists = Lists::new(&cells, &flights, 0.5);
         let drift = 0.5 * (flights[0].velocity + flights[1].velocity);

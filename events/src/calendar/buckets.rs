@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use super::staging::Staging;
-use super::{Calendar, Event, Kind, Plan, never};
+use super::{Calendar, Event, Kind, Plan, earlier, never};
 use crate::blocks::Blocks;
 use crate::prefetch::prefetch;
 
@@ -29,6 +29,8 @@ const FETCHED: i64 = 8;
 const MANY: usize = 1 << 14;
 const FAR: i64 = 64;
 const _: () = assert!(FAR / 2 > ANNOUNCED);
+/// So many waiting times or a few more tell the median of all.
+const SAMPLED: usize = 1 << 10;
 /// The buckets are laid out anew when more entries than so many times their number wait: most of them are of events that are no longer.
 const MOST_WAITING: usize = 4;
 
@@ -244,7 +246,7 @@ impl Buckets {
             return self.lay_out();
         }
         // To look through all owners, which are side by side, is faster than to follow a list through all of the memory.
-        let first = self.owners.iter().map(|owner| owner.event.time).fold(f64::INFINITY, f64::min);
+        let first = self.owners.iter().map(|owner| owner.event.time).fold(f64::INFINITY, earlier);
         if first == f64::INFINITY {
             return false;
         }
@@ -275,15 +277,16 @@ impl Buckets {
     /// events, these come much faster than half of all in the median time. Tells whether there is any.
     #[cold]
     fn lay_out(&mut self) -> bool {
-        let mut times: Vec<f64> =
-            self.owners.iter().map(|owner| owner.event.time).filter(|&time| time < f64::INFINITY).collect();
-        if times.is_empty() {
+        let times = || self.owners.iter().map(|owner| owner.event.time).filter(|&time| time < f64::INFINITY);
+        let count = times().count();
+        if count == 0 {
             self.clear();
             return false;
         }
-        let count = times.len();
-        let (earlier, &mut median, _) = times.select_nth_unstable_by(count / 2, f64::total_cmp);
-        self.origin = earlier.iter().copied().fold(median, f64::min);
+        let mut sample: Vec<f64> = times().step_by(count.div_ceil(SAMPLED)).collect();
+        let middle = sample.len() / 2;
+        let median = *sample.select_nth_unstable_by(middle, f64::total_cmp).1;
+        self.origin = times().fold(f64::INFINITY, earlier);
         // Half of the events come until the median.
         let until_median = (0.5 * count as f64 / (median - self.origin)).min(f64::MAX);
         let lately = self.rate * (self.passed - self.part.1) as f64 / ((self.now - self.part.0) as f64 + 1.0);

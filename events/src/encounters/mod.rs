@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use crate::calendar::{Buckets, Calendar, Event, Kind, NOBODY, Plan, earlier, never};
 use crate::lists::Lists;
-use crate::neighbors::{Cells, Near};
+use crate::neighbors::{Cells, Near, Stream};
 use crate::{Bend, Domain, Flight, NoSurface, Outlook, Surface};
 
 mod ahead;
@@ -424,9 +424,9 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
 
     /// Lays out cells for the grains as they are at `now`, which are yet to enter them.
     fn lay_out_cells(&mut self, now: f64) {
-        let (flights, largest) = self.flights_and_largest_radius();
-        assert!(self.domain.holds(largest), "the periodic domain is less than eight grain radii wide");
-        self.take_cells(Cells::new(self.domain, largest, self.everywhere, &flights, now));
+        let stream = self.stream(now);
+        assert!(self.domain.holds(stream.largest_radius), "the periodic domain is less than eight grain radii wide");
+        self.take_cells(Cells::new(self.domain, self.everywhere, &stream));
     }
 
     /// Takes cells in which nobody is yet.
@@ -438,18 +438,19 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         (self.crossings, self.looks) = (0, 0);
     }
 
-    fn flights_and_largest_radius(&self) -> (Vec<Flight>, f64) {
-        let flights: Vec<Flight> = self.flights.iter().filter(|flight| !is_vacant(flight)).copied().collect();
-        let largest = flights.iter().map(|flight| flight.radius).fold(0.0, f64::max);
-        (flights, largest)
+    fn flights_inside(&self) -> impl Iterator<Item = &Flight> + Clone {
+        self.flights.iter().filter(|flight| !is_vacant(flight))
+    }
+
+    fn stream(&self, now: f64) -> Stream {
+        Stream::new(self.flights_inside(), now)
     }
 
     /// Lays out the cells anew if the stream has changed so much that it pays.
     #[cold]
     fn think_over_cells(&mut self, now: f64) {
-        let (flights, largest) = self.flights_and_largest_radius();
         let Neighbors::Cells(cells) = &self.neighbors else { return };
-        let Some(better) = cells.better(largest, &flights, now, self.crossings, self.looks) else {
+        let Some(better) = cells.better(&self.stream(now), self.crossings, self.looks) else {
             (self.crossings, self.looks) = (0, 0);
             return;
         };

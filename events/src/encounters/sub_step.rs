@@ -157,9 +157,9 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
         if !self.under_force {
             return false;
         }
-        let (flights, largest) = self.flights_and_largest_radius();
-        let Some(skin) = skin(flights.iter(), largest, self.horizon) else { return false };
-        let Some(mut cells) = Cells::with_skin(self.domain, largest, skin, &flights, 0.0) else { return false };
+        let stream = self.stream(0.0);
+        let Some(skin) = skin(self.flights_inside(), stream.largest_radius, self.horizon) else { return false };
+        let Some(mut cells) = Cells::with_skin(self.domain, skin, &stream) else { return false };
         for grain in self.inside() {
             cells.insert(grain, self.flight(grain), 0.0);
         }

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::slots::{cells_of_period, hashed_slots, slots};
+use super::stream::Stream;
 use crate::{Domain, Flight};
 
 /// A cell is wider than the largest contact distance by this fraction, so that a crossing that is late by rounding cannot
@@ -60,7 +61,7 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// Cells of about `width` (m), and at least of the size of a contact, for `flights` as they are at `now` (s, epoch time).
+    /// Cells of about `width` (m), and at least of the size of a contact of grains with `largest_radius` (m), for a stream.
     ///
     /// The grid drifts with the median velocity: that makes the fewest crossings. In a period that these fill only in part there are so many
     /// grains `everywhere`.
@@ -69,9 +70,9 @@ impl Layout {
         largest_radius: f64,
         width: Option<f64>,
         everywhere: usize,
-        flights: &[Flight],
-        now: f64,
+        stream: &Stream,
     ) -> Self {
+        let &Stream { now, ref sample, .. } = stream;
         let contact = contact_width(largest_radius);
         let axes = domain.axes();
         let (mut corner, mut extent) = (Vector3::zeros(), Vector3::repeat(contact));
@@ -79,22 +80,22 @@ impl Layout {
         for &axis in axes {
             if domain.periodic {
                 (corner[axis], extent[axis]) = (domain.min[axis], domain.max[axis] - domain.min[axis]);
-            } else if !flights.is_empty() {
-                let mut places: Vec<f64> = flights.iter().map(|flight| flight.position_at(now)[axis]).collect();
+            } else if !sample.is_empty() {
+                let mut places: Vec<f64> = sample.iter().map(|flight| flight.position_at(now)[axis]).collect();
                 // A few grains that fly ahead do not count.
                 let [low, high] = [quantile(&mut places, 0.05), quantile(&mut places, 0.95)];
-                let flow = Flow::along(axis, flights, now);
+                let flow = Flow::along(axis, sample, now);
                 (drift[axis], growth[axis]) = (flow.velocity_at(low), flow.growth);
                 corner[axis] = low - drift[axis] * now;
                 extent[axis] = contact.max((high - low) / 0.9);
             }
         }
         let volume: f64 = axes.iter().map(|&axis| extent[axis]).product();
-        let grains = if domain.periodic { flights.len().max(everywhere) } else { flights.len() };
+        let grains = if domain.periodic { stream.grains.max(everywhere) } else { stream.grains };
         let cells = if domain.periodic { cells_of_period(grains) } else { slots(grains) };
         let one_in_each_slot = (volume / cells as f64).powf(1.0 / axes.len() as f64);
-        let reach = |flight: &Flight| (flight.position_at(now) - corner - drift * now).amax();
-        let farthest = flights.iter().map(reach).fold(0.0, f64::max);
+        let reach = |place: Vector3<f64>| (place - corner - drift * now).amax();
+        let farthest = if sample.is_empty() { 0.0 } else { stream.corners.map(reach).into_iter().fold(0.0, f64::max) };
         let width = contact.max(width.unwrap_or(one_in_each_slot)).max(farthest / FARTHEST_CELL);
         // In a period each cell has a slot of its own.
         let width = if domain.periodic { width.max(one_in_each_slot) } else { width };
@@ -155,15 +156,16 @@ impl Layout {
         axes.iter().map(|&axis| size[axis]).product()
     }
 
-    /// How many cells `flights` cross in a second, as they are at `now` (s, epoch time).
-    pub(super) fn crossing_rate(&self, flights: &[Flight], now: f64) -> f64 {
+    /// How many cells the sample of a stream crosses in a second.
+    pub(super) fn crossing_rate(&self, stream: &Stream) -> f64 {
+        let now = stream.now;
         let scale = self.scale(now);
         let rate = |flight: &Flight| {
             let place = flight.position_at(now) - (self.corner + self.drift * now);
             let flow = self.drift + place.component_div(&scale).component_mul(&self.growth);
             (flight.velocity - flow).component_div(&self.size).component_div(&scale).lp_norm(1)
         };
-        flights.iter().map(rate).sum()
+        stream.sample.iter().map(rate).sum()
     }
 }
 

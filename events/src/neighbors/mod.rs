@@ -9,12 +9,14 @@
 
 mod layout;
 mod slots;
+mod stream;
 
 use nalgebra::Vector3;
 use wide::{f64x4, u32x4};
 
 use self::layout::{FEWEST_PERIODIC_CELLS, Layout, contact_width};
 use self::slots::{Slots, TURNED};
+pub(crate) use self::stream::Stream;
 use crate::blocks::Block;
 use crate::prefetch::prefetch;
 use crate::{Domain, Flight};
@@ -229,23 +231,17 @@ pub(crate) struct Cells {
 }
 
 impl Cells {
-    /// An empty grid for grains of radius `largest_radius` at most, laid out for `flights` as they are at `now` (s, epoch time). Where these are only a
-    /// part of the grains in the domain there are so many `everywhere`.
-    pub(crate) fn new(domain: Domain, largest_radius: f64, everywhere: usize, flights: &[Flight], now: f64) -> Self {
-        let layout = Layout::new(&domain, largest_radius, None, everywhere, flights, now);
-        Self::empty(domain, layout, flights.len(), everywhere)
+    /// An empty grid, laid out for a stream. Where this is only a part of the grains in the domain there are so many `everywhere`.
+    pub(crate) fn new(domain: Domain, everywhere: usize, stream: &Stream) -> Self {
+        let layout = Layout::new(&domain, stream.largest_radius, None, everywhere, stream);
+        Self::empty(domain, layout, stream.grains, everywhere)
     }
 
-    /// The same with cells that are wider than a contact by `skin` (m).
-    pub(crate) fn with_skin(
-        domain: Domain,
-        largest_radius: f64,
-        skin: f64,
-        flights: &[Flight],
-        now: f64,
-    ) -> Option<Self> {
-        let radius = largest_radius + 0.5 * skin;
-        domain.holds(radius).then(|| Self::new(domain, radius, 0, flights, now))
+    /// The same with cells that are wider than a contact by `skin` (m), if the domain holds such.
+    pub(crate) fn with_skin(domain: Domain, skin: f64, stream: &Stream) -> Option<Self> {
+        let radius = stream.largest_radius + 0.5 * skin;
+        let empty = || Self::empty(domain, Layout::new(&domain, radius, None, 0, stream), stream.grains, 0);
+        domain.holds(radius).then(empty)
     }
 
     fn empty(domain: Domain, layout: Layout, grains: usize, everywhere: usize) -> Self {
@@ -259,28 +255,21 @@ impl Cells {
         Self { layout, domain, made_for: grains, everywhere, around, slots, places: Vec::new(), offsets, shifts }
     }
 
-    /// An empty grid that suits `flights` better, if it is worth its cost; `crossings` and `looks` are what this one took lately.
+    /// An empty grid that suits a stream better, if it is worth its cost; `crossings` and `looks` are what this one took lately.
     ///
     /// Cells x times as wide as they have become by now are crossed 1/x times as often and hold x³ times as many grains to look at. The sum of both
     /// costs is least where x⁴ = cost of the crossings / (3 cost of the looks); in a planar scene x³ with 2.
-    pub(crate) fn better(
-        &self,
-        largest_radius: f64,
-        flights: &[Flight],
-        now: f64,
-        crossings: usize,
-        looks: usize,
-    ) -> Option<Self> {
+    pub(crate) fn better(&self, stream: &Stream, crossings: usize, looks: usize) -> Option<Self> {
         let axes = self.domain.axes();
         let dimensions = axes.len() as f64;
         let (crossing, looking) = (LOOKS_PER_CROSSING * crossings as f64, looks.max(1) as f64);
         let wider = (crossing / (dimensions * looking)).powf(1.0 / (dimensions + 1.0)).clamp(0.5, 2.0);
-        let width = self.layout.volume(axes, now).powf(1.0 / dimensions) * wider;
-        let layout = Layout::new(&self.domain, largest_radius, Some(width), self.everywhere, flights, now);
-        let fewer = layout.crossing_rate(flights, now) / self.layout.crossing_rate(flights, now);
-        let more = layout.volume(axes, now) / self.layout.volume(axes, now);
+        let width = self.layout.volume(axes, stream.now).powf(1.0 / dimensions) * wider;
+        let layout = Layout::new(&self.domain, stream.largest_radius, Some(width), self.everywhere, stream);
+        let fewer = layout.crossing_rate(stream) / self.layout.crossing_rate(stream);
+        let more = layout.volume(axes, stream.now) / self.layout.volume(axes, stream.now);
         let worth_it = fewer * crossing + more * looking < WORTH_A_NEW_LAYOUT * (crossing + looking);
-        worth_it.then(|| Self::empty(self.domain, layout, flights.len(), self.everywhere))
+        worth_it.then(|| Self::empty(self.domain, layout, stream.grains, self.everywhere))
     }
 
     /// Whether grains of this radius fit the cells.
@@ -638,7 +627,7 @@ mod tests {
                     Flight { position, time: 0.0, velocity: Vector3::zeros(), radius }
                 })
                 .collect();
-            let mut cells = Cells::new(domain, radius, 0, &flights, 0.0);
+            let mut cells = Cells::new(domain, 0, &Stream::new(flights.iter(), 0.0));
             (0..).zip(&flights).for_each(|(id, flight)| cells.insert(id, flight, 0.0));
             // It keeps what was written for others.
             let mut near = Near::default();
@@ -688,10 +677,11 @@ mod tests {
                 Flight { position: place, time: 0.0, velocity, radius: 0.4 }
             })
             .collect();
-        let cells = Cells::new(Domain::unbounded(), 0.4, 0, &flights, 0.0);
+        let cells = Cells::new(Domain::unbounded(), 0, &Stream::new(flights.iter(), 0.0));
         let width = |cells: &Cells| cells.layout.volume(&[0, 1, 2], 3.0).cbrt();
         let (crossings, looks) = (1, 1_000_000);
-        let better = cells.better(0.4, &flights, 3.0, crossings, looks).expect("looks cost more than all else");
+        let later = Stream::new(flights.iter(), 3.0);
+        let better = cells.better(&later, crossings, looks).expect("looks cost more than all else");
         assert!(width(&cells) > 3.0 && width(&better) < 0.51 * width(&cells), "{} {}", width(&cells), width(&better));
     }
 }
