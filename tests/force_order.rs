@@ -47,7 +47,7 @@ fn plain_split(scene: &Scene, step: f64, until: f64) -> Vec<(Flight, Grain)> {
     let start: Vec<_> = states(&scene.start(Length::Fixed(step)), 0.0);
     let flights = start.iter().map(|(flight, _)| *flight).collect();
     let [mass, other_mass] = [start[0].1.mass, start[1].1.mass];
-    let mut grains: Encounters = Encounters::new(flights, NoSurface, Domain::unbounded());
+    let mut grains: Encounters = Encounters::new(flights, NoSurface, Domain::unbounded(), f64::INFINITY);
     let kick = |flights: &mut [Flight], time: f64| {
         let impulse = near_field.force_on(flights[1].position - flights[0].position) * time;
         flights[0].velocity += impulse / mass;

@@ -39,7 +39,7 @@ fn main() {
     let mut balls: Vec<Flight> = rack.map(|(row, k)| ball(0.6 + 0.05 * f64::from(row), 0.058 * k, 0.0)).collect();
     balls.push(ball(-0.6, 0.01, 3.0));
 
-    let mut table: Encounters<Cushions> = Encounters::new(balls, cushions, Domain::unbounded());
+    let mut table: Encounters<Cushions> = Encounters::new(balls, cushions, Domain::unbounded(), f64::INFINITY);
     let (mut clicks, mut thuds) = (0, 0);
     while let Some((_, encounter)) = table.next_before(10.0) {
         match encounter {

@@ -1,6 +1,7 @@
 //! The region in which grains are followed.
 
 use nalgebra::Vector3;
+use wide::f64x4;
 
 use crate::Flight;
 
@@ -40,20 +41,20 @@ impl Domain {
     }
 
     /// When the centre of `flight` leaves an open domain (s, epoch time); infinity when it never does.
+    #[inline]
     pub(crate) fn exit_time(&self, flight: &Flight) -> f64 {
-        let mut exit = f64::INFINITY;
-        if !self.periodic {
-            for &axis in self.axes() {
-                let (x, v) = (flight.position[axis], flight.velocity[axis]);
-                let side = if v > 0.0 { self.max[axis] } else { self.min[axis] };
-                let wait = (side - x) / v;
-                // A grain beyond the side leaves at once. One at rest along this axis gives 0/0 or x/0, and never does.
-                let time = flight.time + if wait > 0.0 { wait } else { 0.0 };
-                let time = if v == 0.0 { f64::INFINITY } else { time };
-                exit = if time < exit { time } else { exit };
-            }
+        if self.periodic {
+            return f64::INFINITY;
         }
-        exit
+        let three = |vector: &Vector3<f64>| f64x4::from([vector.x, vector.y, vector.z, 0.0]);
+        let (never, none) = (f64x4::splat(f64::INFINITY), f64x4::ZERO);
+        let [place, speed, min, max] = [&flight.position, &flight.velocity, &self.min, &self.max].map(three);
+        let wait = (speed.simd_gt(none).bitselect(max, min) - place) / speed;
+        // A grain beyond the side leaves at once. One at rest along an axis gives 0/0 or x/0, and never does.
+        let time = flight.time + wait.simd_gt(none).bitselect(wait, none);
+        let [x, y, z, _] = speed.simd_eq(none).bitselect(never, time).to_array();
+        let first = if x < y { x } else { y };
+        if z < first { z } else { first }
     }
 
     /// Moves `position` (m) into a periodic domain; elsewhere nothing happens.

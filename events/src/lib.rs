@@ -11,7 +11,7 @@
 //!     radius: 0.5,
 //! };
 //! // Newton's cradle: the last ball leaves with the speed of the first.
-//! let mut cradle = Encounters::<NoSurface>::new(vec![ball(-3.0, 2.0), ball(0.0, 0.0), ball(1.0, 0.0)], NoSurface, Domain::unbounded());
+//! let mut cradle = Encounters::<NoSurface>::new(vec![ball(-3.0, 2.0), ball(0.0, 0.0), ball(1.0, 0.0)], NoSurface, Domain::unbounded(), f64::INFINITY);
 //! while let Some((_time, encounter)) = cradle.next_before(10.0) {
 //!     let Encounter::Grains { a, b } = encounter else { continue };
 //!     let (va, vb) = (cradle.flight(a).velocity, cradle.flight(b).velocity);

@@ -22,7 +22,7 @@ fn crowd() -> Vec<Flight> {
 
 /// What happens first, with the velocities of smooth elastic spheres of equal mass after each meeting.
 fn first_encounters<C: Calendar>(domain: Domain) -> Vec<(f64, Encounter)> {
-    let mut encounters = Encounters::<NoSurface, C>::new(crowd(), NoSurface, domain);
+    let mut encounters = Encounters::<NoSurface, C>::new(crowd(), NoSurface, domain, f64::INFINITY);
     let mut seen = Vec::new();
     while seen.len() < ENCOUNTERS {
         let next = encounters.next_before(10.0).expect("an encounter");
@@ -58,7 +58,7 @@ fn a_grain_that_had_left_was_fetched_from_where_no_cells_were() {
         };
         (flight.radius, flight.velocity) = (0.1, Vector3::z() * speed);
     }
-    let mut encounters = Encounters::<NoSurface>::new(flights, NoSurface, domain);
+    let mut encounters = Encounters::<NoSurface>::new(flights, NoSurface, domain, f64::INFINITY);
     let mut leave = |until: f64| {
         let mut gone = Vec::new();
         while let Some((_, Encounter::Exit { grain })) = encounters.next_before(until) {

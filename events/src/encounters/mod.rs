@@ -105,7 +105,7 @@ impl Neighbors {
 /// use nalgebra::Vector3;
 ///
 /// let ball = |x: f64, vx: f64| Flight { position: Vector3::new(x, 0.0, 0.0), time: 0.0, velocity: Vector3::new(vx, 0.0, 0.0), radius: 0.5 };
-/// let mut balls = Encounters::<NoSurface>::new(vec![ball(0.0, 1.0), ball(3.0, 0.0)], NoSurface, Domain::unbounded());
+/// let mut balls = Encounters::<NoSurface>::new(vec![ball(0.0, 1.0), ball(3.0, 0.0)], NoSurface, Domain::unbounded(), f64::INFINITY);
 /// assert_eq!(balls.next_before(10.0), Some((2.0, Encounter::Grains { a: 0, b: 1 })));
 /// // Equal elastic balls exchange their velocities.
 /// balls.deflect(&[(0, Vector3::zeros()), (1, Vector3::x())]);
@@ -148,27 +148,29 @@ pub struct Encounters<S: Surface = NoSurface, C: Calendar = Buckets> {
 }
 
 impl<S: Surface, C: Calendar> Encounters<S, C> {
-    /// Grains that meet each other, `surface` and the sides of `domain`. Their local times count from the start of the first epoch.
+    /// Grains that meet each other, `surface` and the sides of `domain`. Their local times count from the start of the first epoch; nothing later than `epoch`
+    /// (s) is scheduled until the next one starts.
     ///
     /// # Panics
     /// Where a periodic domain is too small for the grains ([`Domain::holds`]).
     #[must_use]
-    pub fn new(flights: Vec<Flight>, surface: S, domain: Domain) -> Self {
-        let mut encounters = Self::without_pairs(flights, surface, domain);
+    pub fn new(flights: Vec<Flight>, surface: S, domain: Domain, epoch: f64) -> Self {
+        let mut encounters = Self::without_pairs(flights, surface, domain, epoch);
         encounters.lay_out_cells(0.0);
         encounters.predict_all(0.0);
         encounters
     }
 
-    /// Grains that pass through each other and meet only `surface` and the sides of `domain`.
+    /// The same for grains that pass through each other and meet only `surface` and the sides of `domain`.
     #[must_use]
-    pub fn transparent(flights: Vec<Flight>, surface: S, domain: Domain) -> Self {
-        let mut encounters = Self::without_pairs(flights, surface, domain);
+    pub fn transparent(flights: Vec<Flight>, surface: S, domain: Domain, epoch: f64) -> Self {
+        let mut encounters = Self::without_pairs(flights, surface, domain, epoch);
         encounters.predict_all(0.0);
         encounters
     }
 
-    fn without_pairs(flights: Vec<Flight>, surface: S, domain: Domain) -> Self {
+    fn without_pairs(mut flights: Vec<Flight>, surface: S, domain: Domain, epoch: f64) -> Self {
+        flights.iter_mut().for_each(|flight| domain.wrap(&mut flight.position));
         let mut calendar = C::default();
         calendar.reserve(flights.len());
         let count = flights.len();
@@ -183,7 +185,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
             everywhere: 0,
             crossed: Vec::new(),
             before: [VACANT; 2],
-            horizon: f64::INFINITY,
+            horizon: epoch,
             under_force: false,
             accelerations: Vec::new(),
             sag: 0.0,
@@ -266,7 +268,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     /// use impinge_events::{Domain, Encounters, Flight, NoSurface, prefetch};
     /// # let ball = |x: f64, vx: f64| Flight { position: nalgebra::Vector3::new(x, 0.0, 0.0), time: 0.0, velocity: nalgebra::Vector3::new(vx, 0.0, 0.0), radius: 0.5 };
     /// let (flights, masses) = (vec![ball(0.0, 1.0), ball(3.0, 0.0)], [1.0, 2.0]);
-    /// let mut balls = Encounters::<NoSurface>::new(flights, NoSurface, Domain::unbounded());
+    /// let mut balls = Encounters::<NoSurface>::new(flights, NoSurface, Domain::unbounded(), f64::INFINITY);
     /// while let Some((_, encounter)) = balls.next_before(1.0) {
     ///     balls.soon().iter().for_each(|&grain| prefetch(&masses, grain as usize));
     ///     // ... what `encounter` does to velocities, by `masses`
@@ -684,8 +686,12 @@ mod tests {
             velocity: Vector3::x() * speed,
             radius: 0.5,
         };
-        let mut balls =
-            Encounters::<NoSurface>::new(vec![ball(0.0, 1.0), ball(1.25, 0.0)], NoSurface, Domain::unbounded());
+        let mut balls = Encounters::<NoSurface>::new(
+            vec![ball(0.0, 1.0), ball(1.25, 0.0)],
+            NoSurface,
+            Domain::unbounded(),
+            f64::INFINITY,
+        );
         assert_eq!(balls.looks, 1);
         let meeting = Event { time: 0.25, kind: Kind::Grains, partner: 1 };
         assert_eq!(balls.calendar.plan(1).pair(), Event { partner: 0, ..meeting });

@@ -119,7 +119,7 @@ mod tests {
         let mut flights: Vec<Flight> = (0..8).map(|number| ball(3.0 * f64::from(number), -9.0, 0.0)).collect();
         flights.extend([ball(0.0, 0.0, 2.0), ball(4.0, 6.0, 0.0)]);
         let count = flights.len();
-        let mut balls = Encounters::<NoSurface>::new(flights, NoSurface, Domain::unbounded());
+        let mut balls = Encounters::<NoSurface>::new(flights, NoSurface, Domain::unbounded(), f64::INFINITY);
         balls.keep_only(|_| true, count, 0.0);
         balls.forget_crossings();
         assert_eq!(balls.next_before(9.0), None);

@@ -108,25 +108,27 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     #[must_use]
     pub fn new(grains: &[NewGrain], surface: S, domain: Domain, laws: Laws, start: f64) -> Self {
         let order = side_by_side(grains);
-        let flights = order.iter().map(|&id| flight(&grains[id])).collect();
+        let flights: Vec<Flight> = order.iter().map(|&id| flight(&grains[id])).collect();
+        let (fastest, smallest) = extremes(flights.iter(), surface.speed());
+        let epoch = epoch_length(smallest, fastest, start);
         let encounters = match laws.interference {
-            Interference::None => Encounters::transparent(flights, surface, domain),
-            _ => Encounters::new(flights, surface, domain),
+            Interference::None => Encounters::transparent(flights, surface, domain, epoch),
+            _ => Encounters::new(flights, surface, domain, epoch),
         };
         let carried = order.iter().map(|&id| carried(&grains[id], id as u64)).collect();
         let entered = grains.len() as u64;
-        let mut scheme = Self {
+        Self {
             encounters,
             rows: if laws.collapse == Collapse::Elastic { vec![NO_ROW; grains.len()] } else { Vec::new() },
             grains: carried,
             laws,
             domain,
             epoch_start: start,
-            epoch: 0.0,
-            fastest: 0.0,
-            smallest: f64::INFINITY,
+            epoch,
+            fastest,
+            smallest,
             outrun: false,
-            in_a_row: 0.0,
+            in_a_row: COLLAPSE_TIME * epoch,
             force: UnderForce::default(),
             time: start,
             entered,
@@ -135,9 +137,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             since_mark: 0,
             deepest: 0.0,
             mark: 0.0,
-        };
-        scheme.start_epoch(0.0);
-        scheme
+        }
     }
 
     /// Simulated time that has been reached, s.
@@ -177,12 +177,9 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.epoch_of_extremes(after)
     }
 
-    /// Largest speed along any axis, that of the surface included (m/s), and smallest radius (m).
     fn extremes(&self) -> (f64, f64) {
         let flights = self.encounters.inside().map(|grain| self.encounters.flight(grain));
-        flights.fold((self.encounters.surface().speed(), f64::INFINITY), |(fastest, smallest), flight| {
-            (fastest.max(flight.velocity.amax()), smallest.min(flight.radius))
-        })
+        extremes(flights, self.encounters.surface().speed())
     }
 
     fn epoch_of_extremes(&mut self, after: f64) -> f64 {
@@ -618,6 +615,13 @@ fn in_order<T: Copy>(items: impl Iterator<Item = T> + Clone, id: impl Fn(&T) -> 
     let mut by_id = vec![None; places as usize + 1];
     items.for_each(|item| by_id[id(&item) as usize] = Some(item));
     by_id.into_iter().flatten().collect()
+}
+
+/// Largest speed along any axis, that of the surface included (m/s), and smallest radius (m).
+fn extremes<'a>(flights: impl Iterator<Item = &'a Flight>, surface_speed: f64) -> (f64, f64) {
+    flights.fold((surface_speed, f64::INFINITY), |(fastest, smallest), flight| {
+        (fastest.max(flight.velocity.amax()), smallest.min(flight.radius))
+    })
 }
 
 /// Length of an epoch that starts at simulated time `start` (s), for grains of this radius (m) and speed (m/s): a power of two.
