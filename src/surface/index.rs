@@ -5,7 +5,8 @@ use bvh::bounding_hierarchy::BHShape;
 use bvh::bvh::{Bvh, BvhNode};
 use impinge_events::contact_time::Sweep;
 use impinge_events::{Mesh, Outlook, prefetch};
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
+use wide::f64x4;
 
 /// By how much (relative to coordinates and radii) boxes are widened, so that rounding never hides a triangle.
 ///
@@ -17,21 +18,26 @@ const BOX_SLACK: f64 = 1.0 / (1u64 << 46) as f64;
 #[derive(Clone, Debug)]
 pub(super) struct Index {
     mesh: Mesh,
-    bounds: Aabb<f64, 3>,
+    /// The box around all, and none.
+    bounds: Boxes,
     /// What lies below the root first.
     nodes: Vec<Node>,
     root: Child,
 }
 
-/// A branch of the tree. Two boxes of short numbers and their children fill one line of the cache: to wait for memory is most of what a search costs.
+/// So many boxes are looked at at once.
+const LANES: usize = 4;
+
+/// A branch of the tree: its boxes, of short numbers, and its children fill two lines of the cache. To wait for memory is most of what a search costs, so the fewer
+/// nodes follow each other, the better.
 #[derive(Clone, Copy, Debug)]
-#[repr(align(64))]
+#[repr(align(128))]
 struct Node {
-    boxes: [ShortBox; 2],
-    children: [Child; 2],
+    boxes: Boxes,
+    children: [Child; LANES],
 }
 
-const _: () = assert!(size_of::<Node>() == 64);
+const _: () = assert!(size_of::<Node>() == 128);
 
 /// A node, by its number, or, with the bit [`Child::TRIANGLE`], a triangle.
 #[derive(Clone, Copy, Debug)]
@@ -46,38 +52,91 @@ impl Child {
     }
 }
 
-/// A box that holds another one, in numbers half as long.
+/// Boxes, each of which holds another one in numbers twice as long. Those that are not there lie at infinity.
 #[derive(Clone, Copy, Debug)]
-struct ShortBox {
-    min: [f32; 3],
-    max: [f32; 3],
+struct Boxes {
+    min: [[f32; LANES]; 3],
+    max: [[f32; LANES]; 3],
 }
 
-impl ShortBox {
-    fn around(bounds: &Aabb<f64, 3>) -> Self {
-        let below = |x: f64| if f64::from(x as f32) > x { (x as f32).next_down() } else { x as f32 };
-        let above = |x: f64| if f64::from(x as f32) < x { (x as f32).next_up() } else { x as f32 };
-        let three = |point: &Point3<f64>, round: &dyn Fn(f64) -> f32| [0, 1, 2].map(|axis| round(point[axis]));
-        Self { min: three(&bounds.min, &below), max: three(&bounds.max, &above) }
+impl Boxes {
+    fn around<'a>(boxes: impl IntoIterator<Item = &'a Aabb<f64, 3>>) -> Self {
+        let nowhere = [[f32::INFINITY; LANES]; 3];
+        let mut around = Self { min: nowhere, max: nowhere };
+        for (lane, bounds) in boxes.into_iter().enumerate() {
+            for axis in 0..3 {
+                let (low, high) = (bounds.min[axis], bounds.max[axis]);
+                let (below, above) = (low as f32, high as f32);
+                around.min[axis][lane] = if f64::from(below) > low { below.next_down() } else { below };
+                around.max[axis][lane] = if f64::from(above) < high { above.next_up() } else { above };
+            }
+        }
+        around
     }
 
     #[inline]
-    fn bounds(&self) -> Aabb<f64, 3> {
-        Aabb { min: self.min.map(f64::from).into(), max: self.max.map(f64::from).into() }
+    fn sides(&self, axis: usize) -> [f64x4; 2] {
+        [&self.min, &self.max].map(|sides| f64x4::from(sides[axis].map(f64::from)))
+    }
+
+    /// Vectors from the nearest points of the boxes to `points`; zero inside.
+    #[inline]
+    fn away(&self, points: [f64x4; 3]) -> [f64x4; 3] {
+        std::array::from_fn(|axis| {
+            let [min, max] = self.sides(axis);
+            points[axis] - points[axis].fast_min(max).fast_max(min)
+        })
+    }
+
+    /// The squares of the distances from `point`.
+    #[inline]
+    fn distances_squared(&self, point: &Vector3<f64>) -> f64x4 {
+        let away = self.away(four(point));
+        dot(away, away)
     }
 }
 
-/// Adds the nodes of a tree from number `at` on to `nodes`, each before those below it.
-fn shorten(tree: &[BvhNode<f64, 3>], at: usize, nodes: &mut Vec<Node>) -> Child {
-    match &tree[at] {
-        BvhNode::Leaf { shape_index, .. } => Child(Child::TRIANGLE | *shape_index as u32),
+/// The same point for all boxes.
+#[inline]
+fn four(point: &Vector3<f64>) -> [f64x4; 3] {
+    [0, 1, 2].map(|axis| f64x4::splat(point[axis]))
+}
+
+#[inline]
+fn dot(a: [f64x4; 3], b: [f64x4; 3]) -> f64x4 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// The two below a node of a binary tree, and the boxes around them.
+fn children(node: &BvhNode<f64, 3>) -> Option<[(usize, &Aabb<f64, 3>); 2]> {
+    match node {
+        BvhNode::Leaf { .. } => None,
         BvhNode::Node { child_l_index, child_l_aabb, child_r_index, child_r_aabb, .. } => {
-            let (number, boxes) = (nodes.len(), [child_l_aabb, child_r_aabb].map(ShortBox::around));
-            nodes.push(Node { boxes, children: [Child(0); 2] });
-            nodes[number].children = [*child_l_index, *child_r_index].map(|child| shorten(tree, child, nodes));
-            Child(number as u32)
+            Some([(*child_l_index, child_l_aabb), (*child_r_index, child_r_aabb)])
         }
     }
+}
+
+/// Adds the nodes of a binary tree from number `at` on to `nodes`, each before those below it. In each the largest box gives way to the two in it, as long as there
+/// is room.
+fn widen(tree: &[BvhNode<f64, 3>], at: usize, nodes: &mut Vec<Node>) -> Child {
+    if let BvhNode::Leaf { shape_index, .. } = &tree[at] {
+        return Child(Child::TRIANGLE | *shape_index as u32);
+    }
+    let mut below: Vec<_> = children(&tree[at]).into_iter().flatten().collect();
+    while below.len() < LANES {
+        let area = |place: &usize| below[*place].1.surface_area();
+        let branches = (0..below.len()).filter(|&place| children(&tree[below[place].0]).is_some());
+        let Some(largest) = branches.max_by(|a, b| area(a).total_cmp(&area(b))) else { break };
+        let (branch, _) = below.swap_remove(largest);
+        below.extend(children(&tree[branch]).into_iter().flatten());
+    }
+    let (number, boxes) = (nodes.len(), Boxes::around(below.iter().map(|&(_, bounds)| bounds)));
+    nodes.push(Node { boxes, children: [Child(0); LANES] });
+    for (lane, (child, _)) in below.into_iter().enumerate() {
+        nodes[number].children[lane] = widen(tree, child, nodes);
+    }
+    Child(number as u32)
 }
 
 /// The box of one triangle, for building the tree.
@@ -114,17 +173,10 @@ impl Index {
                 TriangleBox { bounds: Aabb::with_bounds(tight.min - slack, tight.max + slack), node: 0 }
             })
             .collect();
-        let mut nodes = Vec::with_capacity(boxes.len());
-        let root = shorten(&Bvh::build(&mut boxes).nodes, 0, &mut nodes);
-        let bounds = boxes.iter().fold(Aabb::empty(), |bounds, one| bounds.join(&one.bounds));
+        let mut nodes = Vec::new();
+        let root = widen(&Bvh::build(&mut boxes).nodes, 0, &mut nodes);
+        let bounds = Boxes::around([&boxes.iter().fold(Aabb::empty(), |bounds, one| bounds.join(&one.bounds))]);
         Self { mesh, bounds, nodes, root }
-    }
-
-    /// The children of a node, with their boxes.
-    #[inline]
-    fn below(&self, node: Child) -> [(Aabb<f64, 3>, Child); 2] {
-        let Node { boxes, children } = &self.nodes[node.0 as usize];
-        [(boxes[0].bounds(), children[0]), (boxes[1].bounds(), children[1])]
     }
 
     /// Asks the memory for a node or a triangle, which comes while it is found out whether it is needed.
@@ -143,8 +195,8 @@ impl Index {
     /// The first contact of a sweep until `until` (s), elements counted from 0.
     pub(super) fn first_contact(&self, sweep: &Sweep, until: f64) -> Outlook {
         let mut search = Search::new(self, sweep, until);
-        let (enter, leave) = search.passage(&self.bounds);
-        if !enter.is_finite() {
+        let [enter, leave] = search.path.passage(&self.bounds).map(|lanes| lanes.to_array()[0]);
+        if enter > leave {
             return Outlook::ClearUntil(f64::INFINITY);
         }
         let enter = sweep.time(enter);
@@ -175,14 +227,14 @@ impl Index {
             }
             return;
         }
-        let mut children =
-            self.below(node).map(|(bounds, child)| (bounds.min_distance_squared(Point3::from(*point)).sqrt(), child));
-        if children[1].0 < children[0].0 {
-            children.swap(0, 1);
-        }
-        for (distance, child) in children {
-            if distance <= best.1 {
-                self.nearest_below(child, point, best);
+        let Node { boxes, children } = &self.nodes[node.0 as usize];
+        let distances = boxes.distances_squared(point).sqrt().to_array();
+        let mut order: [usize; LANES] = std::array::from_fn(|lane| lane);
+        order.sort_unstable_by(|&a, &b| distances[a].total_cmp(&distances[b]));
+        for lane in order {
+            // None of those that are not there.
+            if distances[lane] <= best.1 && distances[lane] < f64::INFINITY {
+                self.nearest_below(children[lane], point, best);
             }
         }
     }
@@ -206,16 +258,16 @@ impl Index {
             }
             return;
         }
-        for (bounds, child) in self.below(node) {
-            if bounds.min_distance_squared(Point3::from(*point)) < distance * distance {
-                self.within_below(child, point, distance, visit);
-            }
+        let Node { boxes, children } = &self.nodes[node.0 as usize];
+        let near = boxes.distances_squared(point).simd_lt(f64x4::splat(distance * distance)).to_bitmask();
+        for lane in lanes(near) {
+            self.within_below(children[lane], point, distance, visit);
         }
     }
 
     /// Whether `point` lies inside a watertight mesh: a ray from it comes out through an odd number of triangles.
     pub(super) fn encloses(&self, point: &Vector3<f64>) -> bool {
-        if !self.mesh.is_watertight() || !self.bounds.contains(&Point3::from(*point)) {
+        if !self.mesh.is_watertight() || self.bounds.distances_squared(point).to_array()[0] > 0.0 {
             return false;
         }
         // A ray that passes an edge too closely cannot be counted; the next one goes another way.
@@ -231,11 +283,10 @@ impl Index {
         if let Some(triangle) = node.triangle() {
             return crossing(self.mesh.triangle(triangle), point, direction).map(usize::from);
         }
-        let inverse = direction.map(|component| 1.0 / component);
-        self.below(node).into_iter().try_fold(0, |sum, (bounds, child)| {
-            let (enter, _) = passage(&bounds, 0.0, point, &inverse);
-            Some(sum + if enter.is_finite() { self.crossings(child, point, direction)? } else { 0 })
-        })
+        let Node { boxes, children } = &self.nodes[node.0 as usize];
+        let [enter, leave] = Path::new(point, direction, 0.0).passage(boxes);
+        lanes(enter.simd_le(leave).to_bitmask())
+            .try_fold(0, |sum, lane| Some(sum + self.crossings(children[lane], point, direction)?))
     }
 }
 
@@ -256,42 +307,53 @@ fn crossing([a, b, c]: [Vector3<f64>; 3], point: &Vector3<f64>, direction: &Vect
     if inside.abs() > TOO_CLOSE { Some(inside > 0.0 && ahead) } else { (!ahead).then_some(false) }
 }
 
-/// The lesser of two numbers: one instruction, unlike `f64::min`, which looks for NaN. Where the first is none (a flight along a side of a box), the second stands.
+/// The numbers of the bits that are set.
 #[inline]
-fn lesser(a: f64, b: f64) -> f64 {
-    if a < b { a } else { b }
+fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lane = bits.trailing_zeros() as usize;
+        bits &= bits.wrapping_sub(1);
+        (lane < LANES).then_some(lane)
+    })
 }
 
-/// The greater of two numbers, likewise.
-#[inline]
-fn greater(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
+/// The path of a point, and how far boxes are widened for it.
+struct Path {
+    start: Vector3<f64>,
+    /// One over the velocity, component by component; large where that is 0.
+    inverse: Vector3<f64>,
+    margin: f64,
 }
 
-/// When a point that sets off from `point` with velocity 1 / `inverse` enters and leaves a box widened by `margin`; entering
-/// never, at infinity, when it misses it.
-#[inline]
-fn passage(bounds: &Aabb<f64, 3>, margin: f64, point: &Vector3<f64>, inverse: &Vector3<f64>) -> (f64, f64) {
-    let (mut enter, mut leave) = (0.0f64, f64::INFINITY);
-    for axis in 0..3 {
-        let low = (bounds.min[axis] - margin - point[axis]) * inverse[axis];
-        let high = (bounds.max[axis] + margin - point[axis]) * inverse[axis];
-        enter = greater(lesser(low, high), enter);
-        leave = lesser(greater(low, high), leave);
+impl Path {
+    #[inline]
+    fn new(start: &Vector3<f64>, velocity: &Vector3<f64>, margin: f64) -> Self {
+        // Not infinite, or a path along a side of a box would be neither inside nor outside.
+        let inverse = velocity.map(|component| (1.0 / component).clamp(-f64::MAX, f64::MAX));
+        Self { start: *start, inverse, margin }
     }
-    if enter <= leave { (enter, leave) } else { (f64::INFINITY, leave) }
+
+    /// When the point enters and leaves each of the widened boxes; it misses those that it enters after it leaves them.
+    #[inline]
+    fn passage(&self, boxes: &Boxes) -> [f64x4; 2] {
+        let (mut enter, mut leave) = (f64x4::ZERO, f64x4::splat(f64::MAX));
+        for axis in 0..3 {
+            let [min, max] = boxes.sides(axis);
+            let low = (min - (self.start[axis] + self.margin)) * self.inverse[axis];
+            let high = (max - (self.start[axis] - self.margin)) * self.inverse[axis];
+            enter = enter.fast_max(low.fast_min(high));
+            leave = leave.fast_min(low.fast_max(high));
+        }
+        [enter, leave]
+    }
 }
 
 /// The state of one search for a first contact.
 struct Search<'a> {
     index: &'a Index,
     sweep: &'a Sweep,
-    /// One over the velocity, component by component.
-    inverse: Vector3<f64>,
-    /// Magnitude of the velocity.
-    speed: f64,
-    /// The radius and what rounding may hide, m.
-    margin: f64,
+    /// The path of the centre. Boxes are widened by the radius and what rounding may hide.
+    path: Path,
     /// The first contact so far, or the end of the search, s.
     time: f64,
     element: Option<u32>,
@@ -303,60 +365,69 @@ impl<'a> Search<'a> {
     #[inline]
     fn new(index: &'a Index, sweep: &'a Sweep, until: f64) -> Self {
         let margin = sweep.radius + BOX_SLACK * (sweep.radius + sweep.position.amax());
-        let inverse = sweep.velocity.map(|component| 1.0 / component);
-        let speed = sweep.velocity.norm();
-        Self { index, sweep, inverse, speed, margin, time: until, element: None, end: None }
+        let path = Path::new(&sweep.position, &sweep.velocity, margin);
+        Self { index, sweep, path, time: until, element: None, end: None }
     }
 
-    #[inline]
-    fn passage(&self, bounds: &Aabb<f64, 3>) -> (f64, f64) {
-        passage(bounds, self.margin, &self.sweep.position, &self.inverse)
-    }
-
-    /// Before this interval the sphere does not touch the box; infinity when it does not up to the first contact so far.
+    /// Before these intervals the sphere does not touch the boxes, which its centre enters then, after they have been widened.
     ///
     /// When the centre enters the widened box, the sphere may still be away from a corner or a side of the box itself, and
     /// comes nearer by no more than it moves.
     #[inline]
-    fn earliest(&self, bounds: &Aabb<f64, 3>) -> f64 {
-        let (enter, leave) = self.passage(bounds);
-        if enter == f64::INFINITY || self.sweep.time(enter) > self.time {
-            return f64::INFINITY;
-        }
-        let away = from_box(bounds, &(self.sweep.position + self.sweep.velocity * enter)).norm_squared();
-        if away <= self.margin * self.margin {
-            return enter;
-        }
-        let earliest = enter + (away.sqrt() - self.margin) / self.speed;
-        if earliest <= leave { earliest } else { f64::INFINITY }
+    fn earliest(&self, boxes: &Boxes, enter: f64x4) -> f64x4 {
+        let Sweep { position, velocity, .. } = self.sweep;
+        let away = boxes.away(std::array::from_fn(|axis| position[axis] + velocity[axis] * enter));
+        let (away, margin) = (dot(away, away), self.path.margin);
+        let still = (away.sqrt() - margin) / velocity.norm();
+        away.simd_gt(f64x4::splat(margin * margin)).bitselect(enter + still, enter)
     }
 
-    /// Whether the sphere cannot touch the box up to the first contact so far.
+    /// The bits of the boxes that the sphere cannot touch up to the first contact so far.
     ///
-    /// Then the plane through the point of the box that is nearest to the end of the path, at right angles to what lies between
+    /// The plane through the point of the box that is nearest to the end of the path, at right angles to what lies between
     /// them, has the box on one side and the whole path on the other, more than a radius away.
     #[inline]
-    fn is_beyond(&self, bounds: &Aabb<f64, 3>) -> bool {
-        self.end.is_some_and(|end| {
-            let away = from_box(bounds, &end);
-            away.norm_squared() > self.margin * self.margin && away.dot(&self.sweep.velocity) <= 0.0
-        })
+    fn beyond(&self, boxes: &Boxes) -> u32 {
+        let Some(end) = self.end else { return 0 };
+        let (away, margin) = (boxes.away(four(&end)), self.path.margin);
+        let apart = dot(away, away).simd_gt(f64x4::splat(margin * margin));
+        (apart & dot(away, four(&self.sweep.velocity)).simd_le(f64x4::ZERO)).to_bitmask()
     }
 
-    /// Tries everything below `node` that the sphere can touch before the first contact so far, what may come first first.
-    fn visit(&mut self, node: Child) {
-        if let Some(triangle) = node.triangle() {
-            return self.try_triangle(triangle);
-        }
-        let below = self.index.below(node);
-        below.iter().for_each(|&(_, child)| self.index.fetch(child));
-        let [left, right] = below.map(|(bounds, child)| (self.earliest(&bounds), child, bounds));
-        let children = if right.0 < left.0 { [right, left] } else { [left, right] };
-        for (earliest, child, bounds) in children {
-            let in_time = earliest.is_finite() && self.sweep.time(earliest) <= self.time;
-            if in_time && !self.is_beyond(&bounds) {
-                self.visit(child);
+    /// Tries everything below `node` that the sphere can touch before the first contact so far.
+    fn visit(&mut self, mut node: Child) {
+        while node.triangle().is_none() {
+            let Node { boxes, children } = &self.index.nodes[node.0 as usize];
+            children.iter().for_each(|&child| self.index.fetch(child));
+            let [enter, leave] = self.path.passage(boxes);
+            let passed = enter.simd_le(leave).to_bitmask() & !self.beyond(boxes);
+            if !passed.is_power_of_two() {
+                return self.visit_each(children, boxes, enter, leave);
             }
+            // Most of the way it is one only, and what its root would tell comes too late.
+            let lane = passed.trailing_zeros() as usize;
+            if self.sweep.time(enter.to_array()[lane % LANES]) > self.time {
+                return;
+            }
+            node = children[lane % LANES];
+        }
+        node.triangle().into_iter().for_each(|triangle| self.try_triangle(triangle));
+    }
+
+    /// Visits several nodes, of which it is known when the centre enters and leaves their boxes; what may come first first.
+    fn visit_each(&mut self, children: &[Child; LANES], boxes: &Boxes, enter: f64x4, leave: f64x4) {
+        let earliest = self.earliest(boxes, enter);
+        let mut left = earliest.simd_le(leave).to_bitmask();
+        let earliest = earliest.to_array();
+        let earlier = |first: usize, lane: usize| if earliest[lane] < earliest[first] { lane } else { first };
+        while let Some(first) = lanes(left).reduce(earlier) {
+            if self.sweep.time(earliest[first]) > self.time {
+                return;
+            }
+            if self.beyond(boxes) >> first & 1 == 0 {
+                self.visit(children[first]);
+            }
+            left &= !(1 << first);
         }
     }
 
@@ -372,12 +443,6 @@ impl<'a> Search<'a> {
             }
         }
     }
-}
-
-/// Vector from the nearest point of a box to `point`; zero inside.
-#[inline]
-fn from_box(bounds: &Aabb<f64, 3>, point: &Vector3<f64>) -> Vector3<f64> {
-    Vector3::from_fn(|axis, _| point[axis] - greater(lesser(point[axis], bounds.max[axis]), bounds.min[axis]))
 }
 
 #[cfg(test)]

@@ -111,8 +111,9 @@ fn slow_unit(speed: f64) -> f64 {
     if speed > 0.0 { 2f64.powi((-speed.log2()).floor().clamp(0.0, 960.0) as i32) } else { 1.0 }
 }
 
-/// The face of a triangle, hit from both sides.
+/// The face of a triangle, hit from both sides. In two cache lines, not three.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(align(128))]
 pub struct Face {
     /// First corner; the distances below are counted from it.
     origin: Vector3<f64>,
