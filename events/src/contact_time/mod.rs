@@ -7,9 +7,7 @@ mod sphere_triangle;
 mod wide;
 
 pub use sphere_plane::{sphere_plane, sphere_plane_bent};
-pub use sphere_sphere::{
-    MOST_SLACKS, sphere_sphere, sphere_sphere_yielding, spheres_may_touch, spheres_may_touch_four,
-};
+pub use sphere_sphere::{MOST_SLACKS, sphere_sphere, sphere_sphere_yielding, spheres_may_touch};
 pub use sphere_triangle::{Edge, Face, Sweep, sphere_corner, sphere_triangle};
 
 /// Approach speeds below this fraction of the speeds they are the difference of are rounding, not approach.

@@ -76,29 +76,13 @@ pub fn sphere_sphere_yielding(a: &Flight, b: &Flight, shift: Vector3<f64>, slack
     sphere_sphere(a, b, shift)
 }
 
-/// Whether the spheres `a` and `b` may touch until `until` (s, epoch time): a bound without branch or root that hardly ever says yes in
-/// vain, so that most pairs need no more.
+/// Whether the sphere `a` may touch each of four `others` until `until` (s, epoch time); bit k tells of the k-th. A bound without branch or root that hardly ever
+/// says yes in vain, so that most pairs need no more.
 ///
-/// It never says no where [`sphere_sphere`] gives a time up to `until`.
+/// It never says no where [`sphere_sphere`] gives a time up to `until`, nor for an image, whose position has been shifted.
 #[inline]
 #[must_use]
-pub fn spheres_may_touch(a: &Flight, b: &Flight, shift: Vector3<f64>, until: f64) -> bool {
-    let v = b.velocity - a.velocity;
-    let r = b.position_at(a.time) - a.position + shift;
-    let s = a.radius + b.radius;
-    let (approach, v2) = (-r.dot(&v), v.norm_squared());
-    let separation = r.norm_squared() * (1.0 - CAUTION) - s * s * (1.0 + CAUTION);
-    // r² - s² falls by less than 2 approach t within t.
-    let in_time = separation <= approach * (2.0 * (until - a.time));
-    let on_course = v2 * separation <= approach * approach;
-    // Where squares of speeds underflow the course is not known; whoever flies side by side is never in time.
-    in_time & (on_course | (v2 < SMALLEST_SPEED_SQUARED))
-}
-
-/// [`spheres_may_touch`] for one sphere and four others at once: bit k tells of the k-th.
-#[inline]
-#[must_use]
-pub fn spheres_may_touch_four(a: &Flight, others: [&Flight; 4], until: f64) -> u32 {
+pub fn spheres_may_touch(a: &Flight, others: [&Flight; 4], until: f64) -> u32 {
     let four = |of: fn(&Flight) -> f64| f64x4::from(others.map(of));
     // Products are rounded with their sums or not, as the processor can: it is a bound.
     let dot = |a: [f64x4; 3], b: [f64x4; 3]| a[2].mul_add(b[2], a[1].mul_add(b[1], a[0] * b[0]));
@@ -110,8 +94,10 @@ pub fn spheres_may_touch_four(a: &Flight, others: [&Flight; 4], until: f64) -> u
     let s = four(|b| b.radius) + a.radius;
     let (approach, v2, s2) = (-dot(r, v), dot(v, v), s * s);
     let separation = dot(r, r) * (1.0 - CAUTION) - s2 * (1.0 + CAUTION);
+    // r² - s² falls by less than 2 approach t within t.
     let in_time = separation.simd_le(approach * (2.0 * (until - a.time)));
     let on_course = (v2 * separation).simd_le(approach * approach);
+    // Where squares of speeds underflow the course is not known; whoever flies side by side is never in time.
     let unknown = v2.simd_lt(f64x4::splat(SMALLEST_SPEED_SQUARED));
     (in_time & (on_course | unknown)).to_bitmask()
 }

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use crate::Flight;
 use crate::calendar::{Calendar, Event, Kind};
-use crate::contact_time::{sphere_sphere, sphere_sphere_yielding, spheres_may_touch, spheres_may_touch_four};
+use crate::contact_time::{sphere_sphere, sphere_sphere_yielding, spheres_may_touch};
 use crate::neighbors::Near;
 
 /// By this part of the smaller radius grains that touch under force may overlap before they meet again ([`sphere_sphere_yielding`]).
@@ -43,7 +43,7 @@ impl<C: Calendar> Search<'_, C> {
             let mut in_reach = 0;
             for (number, four) in part.iter().enumerate() {
                 let theirs = four.map(|other| &flights[other as usize]);
-                in_reach |= u64::from(spheres_may_touch_four(&ours, theirs, self.until)) << (4 * number);
+                in_reach |= u64::from(spheres_may_touch(&ours, theirs, self.until)) << (4 * number);
             }
             if left < 4 * part.len() {
                 // The last ones have nobody beside them.
@@ -56,9 +56,17 @@ impl<C: Calendar> Search<'_, C> {
                 in_reach &= in_reach - 1;
             }
         }
-        for &(other, shift) in &near.beyond {
-            if spheres_may_touch(&ours, &flights[other as usize], shift, self.until) {
-                self.consider(other, shift);
+        for few in near.beyond.chunks(4) {
+            let four: [_; 4] = std::array::from_fn(|number| few[number.min(few.len() - 1)]);
+            let images = four.map(|(other, shift)| {
+                let theirs = &flights[other as usize];
+                Flight { position: theirs.position + shift, ..*theirs }
+            });
+            let in_reach = spheres_may_touch(&ours, images.each_ref(), self.until);
+            for (number, &(other, shift)) in few.iter().enumerate() {
+                if in_reach >> number & 1 != 0 {
+                    self.consider(other, shift);
+                }
             }
         }
         self.best
