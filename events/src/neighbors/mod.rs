@@ -495,9 +495,10 @@ impl Cells {
             let number = place.number.wrapping_add(offsets[3 * row + 1]);
             occupied |= u32::from(self.slots.occupied(number)) << (3 * row);
         }
-        // Where a row goes on at the other end of the period nobody has looked.
-        let beyond = BEYOND[place.edges as usize];
-        occupied = (occupied | beyond) & wanted;
+        let beyond = BEYOND[usize::from(place.edges)];
+        // Where a row goes on at the other end of the period nobody has looked: that depends on the edges along x only.
+        let unseen = BEYOND[usize::from(place.edges % THREE_TO[1] + INSIDE - INSIDE % THREE_TO[1])];
+        occupied = (occupied | unseen) & wanted;
         let mut here = if place.turned { 0 } else { occupied & !beyond };
         if here != 0 && !self.add_here::<AROUND>(id, offsets, place.number, here, near) {
             (here, near.count) = (0, 0);
