@@ -18,7 +18,7 @@ const BOX_SLACK: f64 = 1.0 / (1u64 << 46) as f64;
 #[derive(Clone, Debug)]
 pub(super) struct Index {
     mesh: Mesh,
-    /// The box around all, and none.
+    /// The box around all; the other three are not there.
     bounds: Boxes,
     /// What lies below the root first.
     nodes: Vec<Node>,
