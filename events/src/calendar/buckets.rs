@@ -29,7 +29,7 @@ const FETCHED: i64 = 8;
 const MANY: usize = 1 << 14;
 const FAR: i64 = 64;
 const _: () = assert!(FAR / 2 > ANNOUNCED);
-/// So many waiting times or a few more tell the median of all.
+/// At most so many waiting times, and at least half of that where there are more, tell the median of all.
 const SAMPLED: usize = 1 << 10;
 /// The buckets are laid out anew when more entries than so many times their number wait: most of them are of events that are no longer.
 const MOST_WAITING: usize = 4;
