@@ -101,8 +101,14 @@ impl Layout {
         let width = if domain.periodic { width.max(one_in_each_slot) } else { width };
         let (mut size, mut period) = (Vector3::repeat(width), Vector3::zeros());
         if domain.periodic {
+            let along = |axis: usize, width: f64| ((extent[axis] / width).floor() as i32).max(FEWEST_PERIODIC_CELLS);
+            let mut width = width;
+            // Where an axis has the fewest the others may have too many.
+            while axes.iter().map(|&axis| f64::from(along(axis, width))).product::<f64>() > cells as f64 {
+                width *= 1.1;
+            }
             for &axis in axes {
-                period[axis] = ((extent[axis] / width).floor() as i32).max(FEWEST_PERIODIC_CELLS);
+                period[axis] = along(axis, width);
                 size[axis] = extent[axis] / f64::from(period[axis]);
             }
         }
@@ -219,6 +225,24 @@ fn quantile(values: &mut [f64], part: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A period much longer than wide had as many cells along it as a cube, times the fewest across: gigabytes for a thousand grains.
+    #[test]
+    fn a_long_thin_period_has_no_more_cells_than_another() {
+        let max = Vector3::new(1.0, 1.0, 1e9);
+        let domain = Domain { min: Vector3::zeros(), max, periodic: true, planar: false };
+        let flight = |number: i32| Flight {
+            position: Vector3::new(0.5, 0.5, 1e6 * f64::from(number)),
+            time: 0.0,
+            velocity: Vector3::zeros(),
+            radius: 0.01,
+        };
+        let flights: Vec<Flight> = (0..1000).map(flight).collect();
+        let layout = Layout::new(&domain, 0.01, None, 0, &Stream::new(flights.iter(), 0.0));
+        assert_eq!(layout.period.xy().as_slice(), [FEWEST_PERIODIC_CELLS; 2]);
+        let cells = layout.cells().expect("a period");
+        assert!((1000..=cells_of_period(1000)).contains(&cells), "{cells}");
+    }
 
     /// A hash that scattered the cells let grains share slots with those of any other cell: a fifth of all that a jet looked at were such strangers. Now none of them is
     /// near, whatever the size of the table.

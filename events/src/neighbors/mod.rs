@@ -15,7 +15,7 @@ use nalgebra::Vector3;
 use wide::{f64x4, u32x4};
 
 use self::layout::{FEWEST_PERIODIC_CELLS, Layout, contact_width};
-use self::slots::{Slots, TURNED};
+use self::slots::{MOST_SLOTS, Slots, TURNED};
 pub(crate) use self::stream::Stream;
 use crate::blocks::Block;
 use crate::prefetch::prefetch;
@@ -100,18 +100,45 @@ impl Near {
     }
 }
 
-/// Where a grain stands in the grid.
+/// Where a grain stands in the grid, in a quarter of a cache line.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(16))]
 struct Place {
     /// Cell along each axis, as the stored position of the grain sees it: in a periodic domain it may lie beyond the period.
     cell: Vector3<i32>,
-    /// Number of the cell, before it is taken modulo the number of slots.
-    number: u32,
-    /// At which ends of the period it lies: as the number of that of the 27 cells around a cell to which one would step there.
-    edges: u8,
-    /// Whether it lies beyond the period.
-    turned: bool,
+    /// From bit 6 on the number of the cell, modulo [`MOST_SLOTS`]; below, whether it lies beyond the period and at which ends of it.
+    packed: u32,
 }
+
+impl Place {
+    const TURNED: u32 = 1 << 5;
+
+    #[inline]
+    fn new(cell: Vector3<i32>, number: u32, edges: u8, turned: bool) -> Self {
+        let turned = if turned { Self::TURNED } else { 0 };
+        Self { cell, packed: number << 6 | turned | u32::from(edges) }
+    }
+
+    /// Number of the cell, to be taken modulo the number of slots.
+    #[inline]
+    fn number(&self) -> u32 {
+        self.packed >> 6
+    }
+
+    /// At which ends of the period it lies: as the number of that of the 27 cells around a cell to which one would step there.
+    #[inline]
+    fn edges(&self) -> u8 {
+        (self.packed % Self::TURNED) as u8
+    }
+
+    /// Whether it lies beyond the period.
+    #[inline]
+    fn turned(&self) -> bool {
+        self.packed & Self::TURNED != 0
+    }
+}
+
+const _: () = assert!(size_of::<Place>() == 16 && (u32::MAX >> 6) as usize + 1 == MOST_SLOTS);
 
 /// Some of the 27 cells around a cell and itself.
 #[derive(Clone, Copy, Debug)]
@@ -128,7 +155,7 @@ pub(crate) struct Region {
 const INSIDE: u8 = 13;
 /// What a step along each axis adds to the number of one of the 27 cells around a cell.
 const THREE_TO: [u8; 3] = [1, 3, 9];
-const NOWHERE: Place = Place { cell: Vector3::new(0, 0, 0), number: 0, edges: INSIDE, turned: false };
+const NOWHERE: Place = Place { cell: Vector3::new(0, 0, 0), packed: INSIDE as u32 };
 /// The bit of a cell itself among the 27 around it.
 const OWN: u32 = 1 << INSIDE;
 
@@ -323,7 +350,7 @@ impl Cells {
             }
             number = number.wrapping_add(self.layout.along(axis, home));
         }
-        Place { cell, number, edges, turned }
+        Place::new(cell, number, edges, turned)
     }
 
     /// Makes room for the places of grains 0 to `grains` - 1, and no more.
@@ -343,7 +370,7 @@ impl Cells {
     fn enter(&mut self, id: u32, cell: Vector3<i32>) {
         let place = self.place(cell);
         self.places[id as usize] = place;
-        self.slots.insert(place.number, if place.turned { id | TURNED } else { id });
+        self.slots.insert(place.number(), if place.turned() { id | TURNED } else { id });
     }
 
     /// Whether grain `id` stands in the cell where it is at `now` (s, epoch time).
@@ -359,7 +386,7 @@ impl Cells {
     /// Takes grain `id` out.
     #[inline]
     pub(crate) fn remove(&mut self, id: u32) {
-        self.slots.remove(self.places[id as usize].number, id);
+        self.slots.remove(self.places[id as usize].number(), id);
     }
 
     /// Tells the grid that a periodic wrap has moved the stored position of `id` by `shift`.
@@ -367,7 +394,7 @@ impl Cells {
         let turns = shift.component_div(&self.domain.extent()).map(|x| x.round() as i32);
         let place = self.place(self.places[id as usize].cell + turns.component_mul(&self.layout.period));
         self.places[id as usize] = place;
-        self.slots.turn(place.number, id, if place.turned { TURNED } else { 0 });
+        self.slots.turn(place.number(), id, if place.turned() { TURNED } else { 0 });
     }
 
     /// When and through which side `flight` leaves its cell.
@@ -436,7 +463,8 @@ impl Cells {
     #[inline]
     pub(crate) fn region_of_next_search(&self, id: u32, side: Option<u8>) -> Option<Region> {
         // Since it was said to come it may have been taken out, and cells laid out that never saw it.
-        let Place { number, edges, .. } = *self.places.get(id as usize)?;
+        let place = self.places.get(id as usize)?;
+        let (number, edges) = (place.number(), place.edges());
         let Some(side) = side else { return Some(Region { number, edges, wanted: self.around }) };
         let (axis, step) = axis_and_step(side);
         let wanted = AHEAD[usize::from(side)] & self.around;
@@ -448,8 +476,8 @@ impl Cells {
     pub(crate) fn fetch_old_and_new(&self, id: u32, side: u8) {
         let Some(place) = self.places.get(id as usize) else { return };
         let (axis, step) = axis_and_step(side);
-        self.slots.fetch(place.number);
-        self.slots.fetch(place.number.wrapping_add(self.layout.along(axis, step)));
+        self.slots.fetch(place.number());
+        self.slots.fetch(place.number().wrapping_add(self.layout.along(axis, step)));
     }
 
     /// Asks the memory for the cells of a region.
@@ -489,18 +517,19 @@ impl Cells {
     /// written down, and what does not count is overwritten. Grains of other cells that share a slot are among them, and now and then a grain is
     /// twice, or `id` is: that costs a look, and changes nothing.
     fn add<const AROUND: bool>(&self, id: u32, place: &Place, wanted: u32, near: &mut Near) {
-        let offsets = &self.offsets[place.edges as usize];
+        let (number, edges) = (place.number(), usize::from(place.edges()));
+        let offsets = &self.offsets[edges];
         let mut occupied = 0;
         for row in 0..9 {
-            let number = place.number.wrapping_add(offsets[3 * row + 1]);
+            let number = number.wrapping_add(offsets[3 * row + 1]);
             occupied |= u32::from(self.slots.occupied(number)) << (3 * row);
         }
-        let beyond = BEYOND[usize::from(place.edges)];
+        let beyond = BEYOND[edges];
         // Where a row goes on at the other end of the period nobody has looked: that depends on the edges along x only.
-        let unseen = BEYOND[usize::from(place.edges % THREE_TO[1] + INSIDE - INSIDE % THREE_TO[1])];
+        let unseen = BEYOND[edges % 3 + usize::from(INSIDE) - usize::from(INSIDE) % 3];
         occupied = (occupied | unseen) & wanted;
-        let mut here = if place.turned { 0 } else { occupied & !beyond };
-        if here != 0 && !self.add_here::<AROUND>(id, offsets, place.number, here, near) {
+        let mut here = if place.turned() { 0 } else { occupied & !beyond };
+        if here != 0 && !self.add_here::<AROUND>(id, offsets, number, here, near) {
             (here, near.count) = (0, 0);
         }
         if occupied != here {
@@ -571,13 +600,14 @@ impl Cells {
 
     /// Adds the grains in those cells around a place whose bits are set, but for `id`, with their shifts. There may be none in some of these cells.
     fn add_beyond(&self, id: u32, place: &Place, mut wanted: u32, near: &mut Near) {
-        let (offsets, leaves) = (&self.offsets[place.edges as usize], &LEAVES[place.edges as usize]);
+        let edges = usize::from(place.edges());
+        let (offsets, leaves) = (&self.offsets[edges], &LEAVES[edges]);
         while wanted != 0 {
             let around = wanted.trailing_zeros() as usize;
             wanted &= wanted - 1;
-            let first = self.slots.first_block(place.number.wrapping_add(offsets[around]));
+            let first = self.slots.first_block(place.number().wrapping_add(offsets[around]));
             for block in std::iter::successors(Some(first), |block| self.slots.next_block(block)) {
-                let stored_there = !place.turned && block.turned() == 0;
+                let stored_there = !place.turned() && block.turned() == 0;
                 for other in block.grains().filter(|&other| other != id) {
                     let shift = match stored_there {
                         true => self.shifts[leaves[around] as usize],

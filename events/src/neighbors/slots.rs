@@ -10,14 +10,15 @@ const SPARSE: usize = 4;
 const MOST_SPARSE: usize = 1 << 17;
 /// Into so many cells for each grain a period is cut beyond that number: half as many, which costs nothing where most of the time is spent waiting for memory.
 const CELLS_PER_GRAIN: usize = 2;
-/// Fewest slots.
+/// Fewest slots, and most: with more than some ten million grains more of them share one.
 const FEWEST: usize = 64;
+pub(super) const MOST_SLOTS: usize = 1 << 26;
 /// A grain whose cell, as its stored position sees it, lies beyond the period: it cannot be looked at without a shift.
 pub(super) const TURNED: u32 = 1 << 31;
 
 /// How many slots so many grains get.
 pub(super) fn slots(grains: usize) -> usize {
-    (SLOTS_PER_GRAIN * grains).max(FEWEST).next_power_of_two()
+    (SLOTS_PER_GRAIN * grains).max(FEWEST).next_power_of_two().min(MOST_SLOTS)
 }
 
 /// How many slots the hashed table for so many grains has: a power of two.
@@ -27,7 +28,8 @@ pub(super) fn hashed_slots(grains: usize) -> usize {
 
 /// Into how many cells a period is cut for so many grains, at most.
 pub(super) fn cells_of_period(grains: usize) -> usize {
-    if grains > MOST_SPARSE { CELLS_PER_GRAIN * grains } else { slots(grains) }
+    // Two more slots have no cell.
+    if grains > MOST_SPARSE { (CELLS_PER_GRAIN * grains).min(MOST_SLOTS - 2) } else { slots(grains) }
 }
 
 impl Block {
@@ -67,6 +69,7 @@ impl Slots {
                 (slots, slots - 1)
             }
         };
+        assert!(slots <= MOST_SLOTS, "a period of {slots} cells");
         Self { mask, grains: Blocks::new(slots), occupied: vec![0; slots] }
     }
 
