@@ -2,33 +2,54 @@
 
 /// A caged grain, one that has hit at least three partners in a row of hits each within [`COLLAPSE_TIME`] of the one before, is part of a
 /// collapse after so many. In the reference jets (restitution 0.8) no grain ever is.
-const COLLAPSE_HITS: u16 = 16;
+const COLLAPSE_HITS: u8 = 16;
 /// A grain in a line, between no more than two partners, is so after this many hits in which its approach speed has not halved. Collapses in
 /// a line die out by themselves and have a closed form; it holds up to an outer grain some fifty times as heavy as the inner one.
-const COLLAPSE_HITS_IN_LINE: u16 = 64;
+const COLLAPSE_HITS_IN_LINE: u8 = 64;
 /// Part of an epoch (0.001 radii of flight of the fastest grain) within which hits are in a row.
 pub(super) const COLLAPSE_TIME: f64 = 1.0 / (1u64 << 22) as f64;
 
-/// Hits of one grain, each shortly after the one before: in half a cache line.
+/// Hits of one grain, each shortly after the one before.
 #[derive(Clone, Copy, Debug)]
-#[repr(align(32))]
 pub(super) struct Row {
     /// Time of the latest hit, s (epoch time).
     latest: f64,
-    /// Approach speed that is to be halved, m/s.
-    speed: f64,
-    /// All hits, or very many.
-    hits: u16,
-    /// Those since the approach speed was halved, or very many.
-    not_halved: u16,
+    /// Approach speed that is to be halved.
+    speed: ShortSpeed,
     /// The first two that were hit.
     partners: [u32; 2],
+    /// All hits, or very many.
+    hits: u8,
+    /// Those since the approach speed was halved, or very many.
+    not_halved: u8,
     /// Whether there was a third.
     caged: bool,
 }
 
-pub(super) const NO_ROW: Row =
-    Row { latest: f64::NEG_INFINITY, speed: 0.0, hits: 0, not_halved: 0, partners: [NOBODY; 2], caged: false };
+const _: () = assert!(size_of::<Row>() == 24 && COLLAPSE_HITS_IN_LINE < u8::MAX && COLLAPSE_HITS < u8::MAX);
+
+/// A speed (m/s) to a millionth, however small it is: the upper half of its bits.
+#[derive(Clone, Copy, Debug)]
+struct ShortSpeed(u32);
+
+impl ShortSpeed {
+    fn of(speed: f64) -> Self {
+        Self((speed.to_bits() >> 32) as u32)
+    }
+
+    fn value(self) -> f64 {
+        f64::from_bits(u64::from(self.0) << 32)
+    }
+}
+
+pub(super) const NO_ROW: Row = Row {
+    latest: f64::NEG_INFINITY,
+    speed: ShortSpeed(0),
+    partners: [NOBODY; 2],
+    hits: 0,
+    not_halved: 0,
+    caged: false,
+};
 /// Where there is no partner.
 const NOBODY: u32 = u32::MAX;
 /// The surface as a partner.
@@ -60,8 +81,8 @@ impl Row {
         self.latest = time;
         self.hits = self.hits.saturating_add(1);
         self.not_halved = self.not_halved.saturating_add(1);
-        if approach < 0.5 * self.speed || self.hits == 1 {
-            (self.speed, self.not_halved) = (approach, 0);
+        if approach < 0.5 * self.speed.value() || self.hits == 1 {
+            (self.speed, self.not_halved) = (ShortSpeed::of(approach), 0);
         }
         if !self.partners.contains(&partner) {
             match self.partners.iter_mut().find(|known| **known == NOBODY) {
