@@ -45,7 +45,7 @@ fn two_grains_in_a_line() {
 fn plain_split(scene: &Scene, step: f64, until: f64) -> Vec<(Flight, Grain)> {
     let near_field = scene.near_field.expect("a near field");
     let start: Vec<_> = states(&scene.start(Length::Fixed(step)), 0.0);
-    let flights = start.iter().map(|(flight, _)| *flight).collect();
+    let flights: Vec<_> = start.iter().map(|(flight, _)| *flight).collect();
     let [mass, other_mass] = [start[0].1.mass, start[1].1.mass];
     let mut grains: Encounters = Encounters::new(flights, NoSurface, Domain::unbounded(), f64::INFINITY);
     let kick = |flights: &mut [Flight], time: f64| {

@@ -1,6 +1,9 @@
 //! Many short lists of numbers, in blocks of three: what is asked of a list comes with one cache line, as a rule.
 
+use std::iter::repeat_n;
+
 use crate::prefetch::prefetch;
+use crate::table::{Table, make_room, table};
 
 /// Up to three numbers of one list, and where the rest are, in 16 bytes.
 #[derive(Clone, Copy, Debug, Default)]
@@ -38,10 +41,10 @@ impl Block {
 /// The lists, which have no order.
 ///
 /// Blocks are read as a whole, but changed a word at a time: a processor waits when it reads in one piece what was just written in several.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(crate) struct Blocks {
     /// The first block of each list, and further ones, all of them full: these come after the lists.
-    blocks: Vec<Block>,
+    blocks: Table<Block>,
     /// Further blocks that are free.
     free: Vec<u32>,
     lists: usize,
@@ -50,12 +53,13 @@ pub(crate) struct Blocks {
 impl Blocks {
     /// Empty lists.
     pub(crate) fn new(lists: usize) -> Self {
-        Self { blocks: vec![Block::default(); lists], free: Vec::new(), lists }
+        Self { blocks: table(repeat_n(Block::default(), lists)), free: Vec::new(), lists }
     }
 
     /// Empties all lists; then there are so many.
     pub(crate) fn reset(&mut self, lists: usize) {
         self.blocks.clear();
+        make_room(&mut self.blocks, lists);
         self.blocks.resize(lists, Block::default());
         self.free.clear();
         self.lists = lists;

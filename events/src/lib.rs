@@ -43,6 +43,7 @@ mod mesh;
 mod neighbors;
 mod prefetch;
 mod surface;
+mod table;
 
 pub use domain::Domain;
 pub use encounters::{Encounter, Encounters, Touch, Vicinity, YIELDING};
@@ -51,6 +52,7 @@ pub use mesh::{BadTriangle, Mesh};
 pub use neighbors::least_period;
 pub use prefetch::prefetch;
 pub use surface::{NoSurface, Outlook, Surface, SurfaceContact};
+pub use table::{Table, table};
 
 /// The program in README.md runs too.
 #[cfg(doctest)]

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use crate::contact_time::{Edge, Face, Sweep, sphere_corner};
 use crate::prefetch::prefetch;
+use crate::table::{Table, make_room, table};
 
 /// A two-sided triangle mesh, open or closed.
 ///
@@ -26,7 +27,7 @@ use crate::prefetch::prefetch;
 pub struct Mesh {
     vertices: Vec<Vector3<f64>>,
     triangles: Vec<[u32; 3]>,
-    faces: Vec<Face>,
+    faces: Table<Face>,
     /// Which sides of each triangle lie within a flat piece of the mesh: bits 0 to 2.
     flat: Vec<u8>,
     /// Where the edges and corners of each triangle begin, and, one past the last triangle, where they end.
@@ -112,7 +113,11 @@ impl Mesh {
             let [a, b, c] = corners.map(|vertex| vertices.get(vertex as usize).copied());
             a.zip(b).zip(c).and_then(|((a, b), c)| Face::new([a, b, c])).ok_or(BadTriangle(number))
         };
-        let faces = triangles.iter().enumerate().map(face).collect::<Result<Vec<_>, _>>()?;
+        let mut faces = table([]);
+        make_room(&mut faces, triangles.len());
+        for numbered in triangles.iter().enumerate() {
+            faces.push(face(numbered)?);
+        }
         let owned = vec![Owned::default(); triangles.len() + 1];
         let mut mesh = Self {
             flat: vec![0; triangles.len()],

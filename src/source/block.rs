@@ -35,6 +35,7 @@ pub(super) fn fill(block: &BlockSource, context: &Context<'_>, cells: &mut Cells
 
     let mut voids = Voids::new(space.centres(falling[falling.len() - 1]), space.walls(), falling.clone());
     let mut positions = vec![Vector3::zeros(); radii.len()];
+    cells.make_room(radii.len());
     for (turn, &index) in order.iter().enumerate() {
         let Some(position) = voids.find(turn, cells, &mut rng) else {
             return Err(saturated(block, &falling[..turn], &space, context));

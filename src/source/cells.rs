@@ -80,6 +80,20 @@ impl Cells {
         self.period
     }
 
+    /// Makes room for so many more grains.
+    pub(super) fn make_room(&mut self, grains: usize) {
+        self.items.reserve_exact(grains);
+        self.make_slots(self.items.len() + grains);
+    }
+
+    /// Makes the table large enough for so many grains.
+    fn make_slots(&mut self, grains: usize) {
+        if grains * SLOTS_PER_GRAIN > self.slots.len() {
+            self.slots = vec![NONE; (grains * SLOTS_PER_GRAIN).next_power_of_two()];
+            (0..self.items.len()).for_each(|index| self.link(index));
+        }
+    }
+
     /// Adds a grain.
     pub(super) fn insert(&mut self, id: u32, position: Vector3<f64>, radius: f64) {
         let number = self.class_for(radius);
@@ -88,13 +102,9 @@ impl Cells {
         let hash = (0..3).fold(class.salt, |hash, axis| hash.wrapping_add(cell_hash(class, axis, cell(axis))));
         let index = u32::try_from(self.items.len()).expect("MOST_GRAINS is far below 2^32");
         self.classes[number].members.push(index);
+        self.make_slots(self.items.len() + 1);
         self.items.push(Item { id, radius, position, hash, next: NONE });
-        if self.items.len() * SLOTS_PER_GRAIN > self.slots.len() {
-            self.slots = vec![NONE; 2 * self.slots.len()];
-            (0..self.items.len()).for_each(|index| self.link(index));
-        } else {
-            self.link(index as usize);
-        }
+        self.link(index as usize);
     }
 
     /// Puts an item at the head of its slot.

@@ -94,6 +94,10 @@ pub fn place(
             }
         };
         placed.counts.push(grains.len());
+        placed.grains.reserve_exact(grains.len());
+        if !matches!(source, Source::Block(_)) {
+            cells.make_room(grains.len());
+        }
         for grain in grains {
             let id = placed.grains.len();
             let origins = Origins { scene, folder, counts: &placed.counts };

@@ -4,7 +4,7 @@ use bvh::aabb::{Aabb, Bounded};
 use bvh::bounding_hierarchy::BHShape;
 use bvh::bvh::{Bvh, BvhNode};
 use impinge_events::contact_time::Sweep;
-use impinge_events::{Mesh, Outlook, prefetch};
+use impinge_events::{Mesh, Outlook, Table, prefetch, table};
 use nalgebra::Vector3;
 use wide::f64x4;
 
@@ -21,7 +21,7 @@ pub(super) struct Index {
     /// The box around all; the other three are not there.
     bounds: Boxes,
     /// What lies below the root first.
-    nodes: Vec<Node>,
+    nodes: Table<Node>,
     root: Child,
 }
 
@@ -176,7 +176,7 @@ impl Index {
         let mut nodes = Vec::new();
         let root = widen(&Bvh::build(&mut boxes).nodes, 0, &mut nodes);
         let bounds = Boxes::around([&boxes.iter().fold(Aabb::empty(), |bounds, one| bounds.join(&one.bounds))]);
-        Self { mesh, bounds, nodes, root }
+        Self { mesh, bounds, nodes: table(nodes), root }
     }
 
     /// Asks the memory for a node or a triangle, which comes while it is found out whether it is needed.

@@ -7,6 +7,7 @@ use super::staging::Staging;
 use super::{Calendar, Event, Kind, Plan, earlier, never};
 use crate::blocks::Blocks;
 use crate::prefetch::prefetch;
+use crate::table::{Table, make_room, table};
 
 /// Buckets for each event: a turn of them is about as long as most events wait when one comes in each.
 const BUCKETS_PER_EVENT: usize = 1;
@@ -42,7 +43,7 @@ const MOST_WAITING: usize = 4;
 /// event is in a bucket, so the heap is all but empty. Should thousands come at once, it is a heap still.
 #[derive(Clone, Debug)]
 pub struct Buckets {
-    owners: Vec<Owner>,
+    owners: Table<Owner>,
     /// The owners in each bucket of a turn, and some whose event is no longer there.
     lists: Blocks,
     /// Events of the present bucket and all before it, and some that are no longer so.
@@ -124,7 +125,7 @@ impl Eq for Entry {}
 impl Default for Buckets {
     fn default() -> Self {
         Self {
-            owners: Vec::new(),
+            owners: table([]),
             lists: Blocks::new(1),
             present: BinaryHeap::new(),
             now: 0,
@@ -311,6 +312,9 @@ impl Buckets {
 
 impl Calendar for Buckets {
     fn reserve(&mut self, owners: usize) {
+        if self.owners.is_empty() {
+            make_room(&mut self.owners, owners);
+        }
         self.owners.resize(owners.max(self.owners.len()), Owner::default());
     }
 

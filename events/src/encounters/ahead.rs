@@ -117,8 +117,7 @@ mod tests {
         };
         let domain =
             Domain { min: Vector3::zeros(), max: Vector3::repeat(f64::from(side)), periodic: true, planar: false };
-        let flights = (0..side.pow(3)).map(&mut flight).collect();
-        let mut gas: Encounters = Encounters::new(flights, NoSurface, domain, f64::INFINITY);
+        let mut gas: Encounters = Encounters::new((0..side.pow(3)).map(&mut flight), NoSurface, domain, f64::INFINITY);
         let (mut told, mut hits) = (HashSet::<u32>::new(), 0);
         let meetings = 20_000;
         for _ in 0..meetings {

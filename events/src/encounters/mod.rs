@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use crate::calendar::{Buckets, Calendar, Event, Kind, NOBODY, Plan, earlier, never};
 use crate::lists::Lists;
 use crate::neighbors::{Cells, Near, Stream};
+use crate::table::{Table, table};
 use crate::{Bend, Domain, Flight, NoSurface, Outlook, Surface};
 
 mod ahead;
@@ -114,7 +115,7 @@ impl Neighbors {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Encounters<S: Surface = NoSurface, C: Calendar = Buckets> {
-    flights: Vec<Flight>,
+    flights: Table<Flight>,
     neighbors: Neighbors,
     calendar: C,
     surface: S,
@@ -154,7 +155,7 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
     /// # Panics
     /// Where a periodic domain is too small for the grains ([`Domain::holds`]).
     #[must_use]
-    pub fn new(flights: Vec<Flight>, surface: S, domain: Domain, epoch: f64) -> Self {
+    pub fn new(flights: impl IntoIterator<Item = Flight>, surface: S, domain: Domain, epoch: f64) -> Self {
         let mut encounters = Self::without_pairs(flights, surface, domain, epoch);
         encounters.lay_out_cells(0.0);
         encounters.predict_all(0.0);
@@ -163,13 +164,14 @@ impl<S: Surface, C: Calendar> Encounters<S, C> {
 
     /// The same for grains that pass through each other and meet only `surface` and the sides of `domain`.
     #[must_use]
-    pub fn transparent(flights: Vec<Flight>, surface: S, domain: Domain, epoch: f64) -> Self {
+    pub fn transparent(flights: impl IntoIterator<Item = Flight>, surface: S, domain: Domain, epoch: f64) -> Self {
         let mut encounters = Self::without_pairs(flights, surface, domain, epoch);
         encounters.predict_all(0.0);
         encounters
     }
 
-    fn without_pairs(mut flights: Vec<Flight>, surface: S, domain: Domain, epoch: f64) -> Self {
+    fn without_pairs(flights: impl IntoIterator<Item = Flight>, surface: S, domain: Domain, epoch: f64) -> Self {
+        let mut flights = table(flights);
         flights.iter_mut().for_each(|flight| domain.wrap(&mut flight.position));
         let mut calendar = C::default();
         calendar.reserve(flights.len());

@@ -19,6 +19,7 @@ use self::slots::{MOST_SLOTS, Slots, TURNED};
 pub(crate) use self::stream::Stream;
 use crate::blocks::Block;
 use crate::prefetch::prefetch;
+use crate::table::{Table, make_room, table};
 use crate::{Domain, Flight};
 
 /// A crossing costs about as much as so many looks at a neighbour. From 5 to 20 no jet and no gas becomes slower by more than 3 %.
@@ -250,7 +251,7 @@ pub(crate) struct Cells {
     /// The bits of the 27 cells around a cell that can hold grains which touch one in it.
     around: u32,
     slots: Slots,
-    places: Vec<Place>,
+    places: Table<Place>,
     /// What the 27 cells around a cell add to its number (and nothing more, to fill up), for each kind of edge.
     offsets: Box<[[u32; 32]; 27]>,
     /// What brings grains at the other end of a period to where their images are (m), for all ends that one may leave it at.
@@ -279,7 +280,7 @@ impl Cells {
         let slots = Slots::new(layout.cells(), grains);
         let shifts =
             std::array::from_fn(|ends| Vector3::from(steps(ends)).map(f64::from).component_mul(&layout.extent));
-        Self { layout, domain, made_for: grains, everywhere, around, slots, places: Vec::new(), offsets, shifts }
+        Self { layout, domain, made_for: grains, everywhere, around, slots, places: table([]), offsets, shifts }
     }
 
     /// An empty grid that suits a stream better, if it is worth its cost; `crossings` and `looks` are what this one took lately.
@@ -355,7 +356,7 @@ impl Cells {
 
     /// Makes room for the places of grains 0 to `grains` - 1, and no more.
     pub(crate) fn reserve(&mut self, grains: usize) {
-        self.places.reserve_exact(grains.saturating_sub(self.places.len()));
+        make_room(&mut self.places, grains);
     }
 
     /// Puts grain `id` into the cell where it is at `now` (s, epoch time).

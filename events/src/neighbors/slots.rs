@@ -1,7 +1,10 @@
 //! The table of cells: hashed, so that memory follows the grains and not the domain; in a period, where cells are few enough, one slot a cell.
 
+use std::iter::repeat_n;
+
 use crate::blocks::{Block, Blocks};
 use crate::prefetch::prefetch;
+use crate::table::{Table, table};
 
 /// Slots for each grain, at least; cells are no smaller than to have one each.
 const SLOTS_PER_GRAIN: usize = 4;
@@ -55,7 +58,7 @@ pub(super) struct Slots {
     grains: Blocks,
     /// Whether there is a grain in the slot before each slot (bit 0), in it, and in the slot after it (bit 2): so an empty cell costs next to
     /// nothing.
-    occupied: Vec<u8>,
+    occupied: Table<u8>,
 }
 
 impl Slots {
@@ -70,7 +73,7 @@ impl Slots {
             }
         };
         assert!(slots <= MOST_SLOTS, "a period of {slots} cells");
-        Self { mask, grains: Blocks::new(slots), occupied: vec![0; slots] }
+        Self { mask, grains: Blocks::new(slots), occupied: table(repeat_n(0, slots)) }
     }
 
     /// Index of the first block of a cell.

@@ -1,9 +1,10 @@
 //! From one predicted collision to the next.
 
+use std::iter::repeat_n;
 use std::ops::ControlFlow;
 
 use impinge_events::calendar::{Buckets, Calendar};
-use impinge_events::{Domain, Encounter, Encounters, Flight, Surface, prefetch};
+use impinge_events::{Domain, Encounter, Encounters, Flight, Surface, Table, prefetch, table};
 use nalgebra::Vector3;
 
 mod collapse;
@@ -72,9 +73,9 @@ pub struct Laws {
 pub struct EventDriven<S: Surface, C: Calendar = Buckets> {
     encounters: Encounters<S, C>,
     /// What grains carry besides their flights, by the numbers of `encounters`.
-    grains: Vec<Grain>,
+    grains: Table<Grain>,
     /// How the latest hits of each grain followed each other, by the same numbers; empty where collapses are not treated.
-    rows: Vec<Row>,
+    rows: Table<Row>,
     laws: Laws,
     domain: Domain,
     /// Simulated time at the start of the epoch, s.
@@ -108,18 +109,18 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     #[must_use]
     pub fn new(grains: &[NewGrain], surface: S, domain: Domain, laws: Laws, start: f64) -> Self {
         let order = side_by_side(grains);
-        let flights: Vec<Flight> = order.iter().map(|&id| flight(&grains[id])).collect();
-        let (fastest, smallest) = extremes(flights.iter(), surface.speed());
+        let flights = order.iter().map(|&(_, id)| flight(&grains[id as usize]));
+        let (fastest, smallest) = extremes(flights.clone(), surface.speed());
         let epoch = epoch_length(smallest, fastest, start);
         let encounters = match laws.interference {
             Interference::None => Encounters::transparent(flights, surface, domain, epoch),
             _ => Encounters::new(flights, surface, domain, epoch),
         };
-        let carried = order.iter().map(|&id| carried(&grains[id], id as u64)).collect();
+        let carried = table(order.iter().map(|&(_, id)| carried(&grains[id as usize], u64::from(id))));
         let entered = grains.len() as u64;
         Self {
             encounters,
-            rows: if laws.collapse == Collapse::Elastic { vec![NO_ROW; grains.len()] } else { Vec::new() },
+            rows: if laws.collapse == Collapse::Elastic { table(repeat_n(NO_ROW, grains.len())) } else { table([]) },
             grains: carried,
             laws,
             domain,
@@ -178,7 +179,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     }
 
     fn extremes(&self) -> (f64, f64) {
-        let flights = self.encounters.inside().map(|grain| self.encounters.flight(grain));
+        let flights = self.encounters.inside().map(|grain| *self.encounters.flight(grain));
         extremes(flights, self.encounters.surface().speed())
     }
 
@@ -599,26 +600,30 @@ fn snapshot_of<'a, S: Surface + 'a, C: Calendar + 'a, R>(
     look: impl FnOnce(&Snapshot<'_>) -> R,
 ) -> R {
     let slots = in_order(slots, |&(engine, slot)| engine.grains[slot as usize].id);
-    let flights: Vec<Flight> = slots.iter().map(|&(engine, slot)| engine.flight_in_snapshot(slot, time)).collect();
-    let grains: Vec<Grain> = slots.iter().map(|&(engine, slot)| engine.grains[slot as usize]).collect();
+    let flights = table(slots.iter().map(|&(engine, slot)| engine.flight_in_snapshot(slot, time)));
+    let grains = table(slots.iter().map(|&(engine, slot)| engine.grains[slot as usize]));
     look(&Snapshot { time, flights: &flights, grains: &grains })
 }
 
 /// Items in the order of their ids, all of which differ.
-fn in_order<T: Copy>(items: impl Iterator<Item = T> + Clone, id: impl Fn(&T) -> u64) -> Vec<T> {
+fn in_order<T: Copy>(items: impl Iterator<Item = T> + Clone, id: impl Fn(&T) -> u64) -> Table<T> {
+    let Some(any) = items.clone().next() else { return table([]) };
     let (count, places) = items.clone().fold((0, 0), |(count, places), item| (count + 1, id(&item).max(places)));
     if places >= MOST_PLACES * count {
-        let mut items: Vec<T> = items.collect();
+        let mut items = table(items);
         items.sort_unstable_by_key(id);
         return items;
     }
-    let mut by_id = vec![None; places as usize + 1];
-    items.for_each(|item| by_id[id(&item) as usize] = Some(item));
-    by_id.into_iter().flatten().collect()
+    // Where nobody belongs, somebody stands who belongs elsewhere.
+    let mut by_id = table(repeat_n(any, places as usize + 1));
+    items.for_each(|item| by_id[id(&item) as usize] = item);
+    let mut ids = 0..;
+    by_id.retain(|item| Some(id(item)) == ids.next());
+    by_id
 }
 
 /// Largest speed along any axis, that of the surface included (m/s), and smallest radius (m).
-fn extremes<'a>(flights: impl Iterator<Item = &'a Flight>, surface_speed: f64) -> (f64, f64) {
+fn extremes(flights: impl Iterator<Item = Flight>, surface_speed: f64) -> (f64, f64) {
     flights.fold((surface_speed, f64::INFINITY), |(fastest, smallest), flight| {
         (fastest.max(flight.velocity.amax()), smallest.min(flight.radius))
     })
@@ -638,18 +643,19 @@ fn broken(time: f64, ids: &[u64], overlap: f64, allowed: f64, numbers: bool) -> 
 }
 
 /// The grains in an order in which those that are near in space are near in memory: row by row of cubes that hold a few of them.
-pub(super) fn side_by_side(grains: &[NewGrain]) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..grains.len()).collect();
+pub(super) fn side_by_side(grains: &[NewGrain]) -> Table<([u32; 3], u32)> {
     let low = grains.iter().fold(Vector3::repeat(f64::INFINITY), |low, grain| low.inf(&grain.position));
     let high = grains.iter().fold(Vector3::repeat(f64::NEG_INFINITY), |high, grain| high.sup(&grain.position));
     let extent = high - low;
     let axes = extent.iter().filter(|&&along| along > 0.0);
     let cubes = grains.len() as f64 / GRAINS_PER_CUBE;
     let side = (axes.clone().product::<f64>() / cubes).powf(1.0 / axes.count().max(1) as f64);
-    order.sort_by_cached_key(|&id| {
-        let cube = ((grains[id].position - low) / side).map(|x| x as u32);
-        [cube.z, cube.y, cube.x]
-    });
+    let in_cube = |(id, grain): (u32, &NewGrain)| {
+        let cube = ((grain.position - low) / side).map(|x| x as u32);
+        ([cube.z, cube.y, cube.x], id)
+    };
+    let mut order = table((0..).zip(grains).map(in_cube));
+    order.sort_unstable();
     order
 }
 
@@ -669,7 +675,7 @@ mod tests {
     fn items_come_in_the_order_of_their_ids_however_many_ids_there_are() {
         for step in [1, 3, 1_000_000_000_000] {
             let shuffled: Vec<u64> = (0..101).map(|number| number * 37 % 101 * step).collect();
-            let sorted: Vec<u64> = (0..101).map(|number| number * step).collect();
+            let sorted = table((0..101).map(|number| number * step));
             assert_eq!(in_order(shuffled.into_iter(), |&id| id), sorted, "step {step}");
         }
         assert!(in_order([].into_iter(), |&id| id).is_empty());

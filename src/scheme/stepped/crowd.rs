@@ -85,8 +85,8 @@ impl Crowd {
         let order = side_by_side(grains);
         Self {
             mass: grains.iter().map(NewGrain::mass).sum(),
-            flights: order.iter().map(|&id| flight(&grains[id])).collect(),
-            grains: order.iter().map(|&id| carried(&grains[id], id as u64)).collect(),
+            flights: order.iter().map(|&(_, id)| flight(&grains[id as usize])).collect(),
+            grains: order.iter().map(|&(_, id)| carried(&grains[id as usize], u64::from(id))).collect(),
             laws,
             domain,
             surface_speed: impinge_events::Surface::speed(&surface) * 3f64.sqrt(),

@@ -1,0 +1,55 @@
+//! Tables that are as long as there are grains, in large pages.
+
+use hugealloc::HugeAlloc;
+
+/// A large page, bytes.
+const LARGE: usize = 2 << 20;
+/// Whoever asks for more than this (bytes) gets pages that nobody has used, not what was given back, which is in small pages: the limit of glibc, and a page. Room
+/// that is not used takes no memory.
+const ALWAYS_MAPPED: usize = (32 << 20) + LARGE;
+
+/// A vector that asks the operating system for large pages (2 MB, where it has such) once it is as large itself.
+///
+/// What a collision needs of the grains around it lies anywhere in tables of many megabytes. In pages of 4 KB the processor spends more time on
+/// finding out where in memory that is than on the rest.
+pub type Table<T> = allocator_api2::vec::Vec<T, HugeAlloc>;
+
+/// A table of these items, and no room for more if their number is known.
+///
+/// ```
+/// let mut masses = impinge_events::table([1.0, 2.5]);
+/// masses.push(3.0);
+/// assert_eq!(masses.iter().sum::<f64>(), 6.5);
+/// ```
+#[must_use]
+pub fn table<T>(items: impl IntoIterator<Item = T>) -> Table<T> {
+    let items = items.into_iter();
+    let mut table = Table::new_in(HugeAlloc);
+    make_room(&mut table, items.size_hint().0);
+    table.extend(items);
+    table
+}
+
+/// Makes room for so many items in all.
+pub(crate) fn make_room<T>(table: &mut Table<T>, items: usize) {
+    let large = items.saturating_mul(size_of::<T>()) >= LARGE;
+    let room = if large { items.max(ALWAYS_MAPPED / size_of::<T>()) } else { items };
+    table.reserve_exact(room.saturating_sub(table.len()));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_large_tables_have_more_room_than_they_need() {
+        let small = table(std::iter::repeat_n([1.0; 4], 1000));
+        assert_eq!((small.len(), small.capacity()), (1000, 1000));
+        let large = table(std::iter::repeat_n([1.0; 4], 100_000));
+        assert_eq!((large.len(), large.capacity()), (100_000, ALWAYS_MAPPED / 32));
+        assert_eq!(large.iter().flatten().sum::<f64>(), 400_000.0);
+        let huge = table(std::iter::repeat_n([1.0; 4], ALWAYS_MAPPED / 16));
+        assert_eq!((huge.len(), huge.capacity()), (ALWAYS_MAPPED / 16, ALWAYS_MAPPED / 16));
+        assert_eq!(table(std::iter::repeat_n((), 10)).len(), 10);
+    }
+}
