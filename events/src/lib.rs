@@ -29,6 +29,7 @@
 //! * [`calendar`]: the predicted events in one total order; a plain one and a fast one that equals it.
 //! * neighbours: cells that drift with the stream (private: they cannot change a bit of what happens).
 //! * [`Encounters`]: all of it together; tells who meets whom next.
+//! * [`Table`]: what is as long as there are grains, in large pages; for whoever keeps more about each grain, as is [`prefetch`].
 //!
 //! Lengths are in metres, times in seconds, or in any other consistent units: nothing here has a scale.
 
