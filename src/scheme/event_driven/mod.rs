@@ -642,7 +642,7 @@ fn broken(time: f64, ids: &[u64], overlap: f64, allowed: f64, numbers: bool) -> 
     if numbers { Broken::Overlap { time, grains, overlap, allowed } } else { Broken::NotANumber { time, grains } }
 }
 
-/// The grains in an order in which those that are near in space are near in memory: row by row of cubes that hold a few of them.
+/// The grains in an order in which those that are near in space are near in memory, row by row of cubes that hold a few of them; each with its cube.
 pub(super) fn side_by_side(grains: &[NewGrain]) -> Table<([u32; 3], u32)> {
     let low = grains.iter().fold(Vector3::repeat(f64::INFINITY), |low, grain| low.inf(&grain.position));
     let high = grains.iter().fold(Vector3::repeat(f64::NEG_INFINITY), |high, grain| high.sup(&grain.position));
