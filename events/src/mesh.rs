@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use crate::contact_time::{Edge, Face, Sweep, sphere_corner};
 use crate::prefetch::prefetch;
-use crate::table::{Table, make_room, table};
+use crate::table::{Table, table};
 
 /// A two-sided triangle mesh, open or closed.
 ///
@@ -113,11 +113,7 @@ impl Mesh {
             let [a, b, c] = corners.map(|vertex| vertices.get(vertex as usize).copied());
             a.zip(b).zip(c).and_then(|((a, b), c)| Face::new([a, b, c])).ok_or(BadTriangle(number))
         };
-        let mut faces = table([]);
-        make_room(&mut faces, triangles.len());
-        for numbered in triangles.iter().enumerate() {
-            faces.push(face(numbered)?);
-        }
+        let faces = table(triangles.iter().enumerate().map(face).collect::<Result<Vec<_>, _>>()?);
         let owned = vec![Owned::default(); triangles.len() + 1];
         let mut mesh = Self {
             flat: vec![0; triangles.len()],

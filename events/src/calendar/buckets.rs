@@ -315,7 +315,8 @@ impl Calendar for Buckets {
         if self.owners.is_empty() {
             make_room(&mut self.owners, owners);
         }
-        self.owners.resize(owners.max(self.owners.len()), Owner::default());
+        let owners = owners.max(self.owners.len());
+        self.owners.resize(owners, Owner::default());
     }
 
     // In one piece with what chose the event, or it goes through memory, and is read there in other pieces than it was written.

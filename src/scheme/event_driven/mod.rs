@@ -193,7 +193,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.epoch_start += after;
         self.epoch = length;
         self.outrun = false;
-        for row in &mut self.rows {
+        for row in self.rows.iter_mut() {
             row.start_epoch(after);
         }
         (self.mark, self.since_mark) = (0.0, 0);
@@ -675,8 +675,8 @@ mod tests {
     fn items_come_in_the_order_of_their_ids_however_many_ids_there_are() {
         for step in [1, 3, 1_000_000_000_000] {
             let shuffled: Vec<u64> = (0..101).map(|number| number * 37 % 101 * step).collect();
-            let sorted = table((0..101).map(|number| number * step));
-            assert_eq!(in_order(shuffled.into_iter(), |&id| id), sorted, "step {step}");
+            let sorted: Vec<u64> = (0..101).map(|number| number * step).collect();
+            assert_eq!(in_order(shuffled.into_iter(), |&id| id)[..], sorted, "step {step}");
         }
         assert!(in_order([].into_iter(), |&id| id).is_empty());
     }
