@@ -179,7 +179,8 @@ impl Buckets {
     fn enter(&mut self, owner: u32, event: Event) {
         let bucket = self.bucket(event.time);
         if bucket <= self.now {
-            self.passed += 1;
+            // Earlier than this bucket are only events that are found once more, after time went back: they are no crowd.
+            self.passed += usize::from(bucket == self.now);
             return self.present.push(Entry { event, owner });
         }
         // Those of later turns are looked for when their turn comes.
@@ -549,6 +550,23 @@ mod tests {
             assert!(!calendar.is_crowded());
             calendar.cancel(owner);
         }
+    }
+
+    /// Two cores go back in time now and then: what came once more was taken for a crowd, and the buckets became ten times too narrow.
+    #[test]
+    fn what_came_once_more_was_taken_for_a_crowd() {
+        let mut calendar = Buckets::default();
+        let event = |time| Event { time, kind: Kind::Grains, partner: 0 };
+        (0..1000).for_each(|owner| calendar.schedule(owner, event(f64::from(owner))));
+        (0..500).for_each(|owner| calendar.schedule(owner, event(1000.0 + f64::from(owner))));
+        assert_eq!(calendar.next(), Some((500, event(500.0))));
+        let rate = calendar.rate;
+        for step in 0..10_000 {
+            let earlier = event(400.0 + 0.01 * f64::from(step));
+            calendar.schedule(500, earlier);
+            assert_eq!(calendar.next(), Some((500, earlier)));
+        }
+        assert_eq!(calendar.rate, rate);
     }
 
     /// Entries of events that were given up went on to wait, and a calendar with nothing else was laid out without end.
