@@ -50,7 +50,8 @@ impl Cut {
         let Some(period) = self.period else {
             return if half == 0 { [f64::INFINITY, self.high - x] } else { [x - self.high, f64::INFINITY] };
         };
-        let (place, width) = ((x - self.low).rem_euclid(period), self.high - self.low);
+        let (x, width) = (x - self.low, self.high - self.low);
+        let place = x - (x / period).floor() * period;
         let (in_first, in_second) = ([place, width - place], [place - width, period - place]);
         match (half == 0, place < width) {
             (true, true) => in_first,

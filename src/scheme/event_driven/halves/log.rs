@@ -4,6 +4,7 @@ use impinge_events::calendar::Kind;
 use impinge_events::{Encounter, Flight};
 use nalgebra::Vector3;
 
+use super::Renewal;
 use crate::grains::Grain;
 use crate::scheme::event_driven::collapse::Row;
 use crate::scheme::{GrainCollision, Observer, Passage, SurfaceHit};
@@ -12,10 +13,16 @@ use crate::scheme::{GrainCollision, Observer, Passage, SurfaceHit};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Happened {
     pub(super) time: f64,
-    pub(super) encounter: Encounter,
+    kind: Kind,
+    /// Whether it is for this half to tell.
+    pub(super) is_ours: bool,
+    /// Two grains, or one and an element of the surface, or one and 0.
+    ids: [u32; 2],
     /// How much was told to observers before it.
     pub(super) told: u32,
 }
+
+const _: () = assert!(size_of::<Happened>() == 24);
 
 /// What a grain carried before an encounter that changed it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,22 +41,25 @@ impl Carried {
 pub(super) type Place = (u64, Kind, [u32; 2]);
 
 impl Happened {
-    /// Where it stands in the order of events. Times of an epoch are not negative, so their bits are in order.
-    pub(super) fn place(&self) -> Place {
-        let (kind, ids) = match self.encounter {
+    pub(super) fn new(time: f64, encounter: Encounter, told: usize) -> Self {
+        let (kind, ids) = match encounter {
             Encounter::Grains { a, b } => (Kind::Grains, [a, b]),
             Encounter::Surface { grain, element } => (Kind::Surface, [grain, element]),
             Encounter::Exit { grain } => (Kind::Exit, [grain, 0]),
         };
-        (self.time.to_bits(), kind, ids)
+        Self { time, kind, is_ours: true, ids, told: told as u32 }
+    }
+
+    /// Where it stands in the order of events. Times of an epoch are not negative, so their bits are in order.
+    #[inline]
+    pub(super) fn place(&self) -> Place {
+        (self.time.to_bits(), self.kind, self.ids)
     }
 
     /// The two grains that took part; twice the same where it was one.
+    #[inline]
     pub(super) fn pair(&self) -> [u32; 2] {
-        match self.encounter {
-            Encounter::Grains { a, b } => [a, b],
-            Encounter::Surface { grain, .. } | Encounter::Exit { grain } => [grain; 2],
-        }
+        if self.kind == Kind::Grains { self.ids } else { [self.ids[0]; 2] }
     }
 
     /// Each grain that took part.
@@ -80,12 +90,12 @@ pub(super) struct Log {
     passages: Vec<(Passage, f64, Flight, Grain)>,
     /// The rows of the grains of each event before it, where collapses are treated.
     pub(super) rows: Vec<[Row; 2]>,
-    /// Which events have to do with grains that are known to both halves.
-    pub(super) shared: Vec<u32>,
+    /// The events that have to do with grains that are known to both halves, and their numbers: side by side, since the other core reads them.
+    pub(super) shared: Vec<(u32, Happened)>,
     /// Grains of this half whose copies may have to change, as they fly now.
     pub(super) to_watch: Vec<u32>,
-    /// Grains of this half whose copies have to change.
-    pub(super) to_change: Vec<u32>,
+    /// What the copies become that the other half has of grains of this one, where they have to change: as these fly now.
+    pub(super) to_change: Vec<Renewal>,
     /// Largest speed towards the cut that a grain got, m/s.
     pub(super) fastest: f64,
     /// Whether a grain became too fast for the epoch.

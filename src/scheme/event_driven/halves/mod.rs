@@ -20,7 +20,7 @@ use impinge_events::{Flight, Surface};
 
 use self::log::{Happened, Log};
 use self::sharing::Sharing;
-use self::together::{alone, both};
+use self::together::{alone, beside, both};
 use super::collapse::Row;
 use super::{EventDriven, snapshot_of};
 use crate::grains::{Grain, Snapshot};
@@ -241,13 +241,13 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
         if self.now == from && events == 0 && until > from {
             return self.run_alone(until, observer);
         }
-        self.tell(observer);
         self.windows_surveyed += 1;
         for (half, Half { log, .. }) in self.halves.iter().enumerate() {
             self.events[half] += log.events.len();
             self.sharing.watch(half, &log.to_watch);
         }
-        self.renew_copies(until);
+        self.prepare_renewal(until);
+        self.tell_and_renew(observer);
         if self.now < until {
             self.windows.cut_short += 1;
             self.window *= (SHORTER * (self.now - from) / self.window).max(SHORTEST);
@@ -273,27 +273,16 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
         self.now = now;
     }
 
-    /// Tells an observer what happened, each event once, in their order.
-    fn tell(&mut self, observer: &mut impl Observer) {
-        let logs = self.halves.each_ref().map(|half| &half.log);
-        let mut next = [0, 0];
-        loop {
-            let heads: [_; 2] = std::array::from_fn(|half| logs[half].events.get(next[half]));
-            let places = heads.map(|head| head.map(Happened::place));
-            let Some(first) = places.iter().flatten().min() else { break };
-            for half in 0..2 {
-                let Some(event) = heads[half].filter(|_| places[half] == Some(*first)) else { continue };
-                let mut belong = event.grains().map(|grain| self.sharing.belongs_to(half, grain));
-                // What happened across the cut the first half tells.
-                if if half == 0 { belong.any(|ours| ours) } else { belong.all(|ours| ours) } {
-                    self.windows.told += 1;
-                    let (collisions, gone) = logs[half].tell(next[half], observer);
-                    self.collisions += collisions;
-                    self.inside -= gone;
-                }
-                next[half] += 1;
-            }
-        }
+    /// Tells an observer what happened, while the other core prepares that both halves get copies of what is near the cut.
+    fn tell_and_renew(&mut self, observer: &mut impl Observer) {
+        let Self { halves, sharing, renewals, now, .. } = self;
+        let told = beside(
+            || tell(halves.each_ref().map(|half| &half.log), observer),
+            || renew_found(halves, sharing, renewals, *now),
+        );
+        self.windows.told += told.events;
+        self.collisions += told.collisions;
+        self.inside -= told.gone;
     }
 
     /// Looks at all grains: moves the cut towards the half that has more to do, makes the zone thicker or thinner, and finds all grains whose copies have
@@ -322,9 +311,8 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
         self.sharing.watch_only([&ours, &theirs]);
     }
 
-    /// Hands grains over that have crossed the cut, and prepares that both halves get copies of what is near it. Whose copies change has been found for
-    /// the moment `found_for` (s, epoch time).
-    fn renew_copies(&mut self, found_for: f64) {
+    /// Looks at all grains if it is time, and finds out whose copies have to change, unless that was found for this very moment (s, epoch time).
+    fn prepare_renewal(&mut self, found_for: f64) {
         let is_time = self.now >= self.sharing.surveyed_until;
         if is_time {
             self.survey();
@@ -334,35 +322,6 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
             let find = |half, Half { engine, log }: &mut Half<S, C>| engine.find_changes(half, now, sharing, log);
             both(|| find(0, first), || find(1, second));
         }
-        alone(|| self.renew_found());
-    }
-
-    /// Renews those copies that were found to have to change.
-    fn renew_found(&mut self) {
-        for half in 0..2 {
-            let to_change = self.halves[half].log.to_change.iter().copied();
-            for grain in to_change.filter(|&grain| !self.sharing.is_wrong(grain)).collect::<Vec<_>>() {
-                self.renew_copy(grain);
-            }
-        }
-        for grain in std::mem::take(&mut self.sharing.wrong) {
-            self.renew_copy(grain);
-        }
-    }
-
-    fn renew_copy(&mut self, grain: u32) {
-        let half = self.sharing.owner_of(grain);
-        let engine = &self.halves[half].engine;
-        let flight = engine.encounters.flight(grain);
-        let state = match self.sharing.change(grain, flight, self.now) {
-            None => return,
-            Some(false) => None,
-            Some(true) => {
-                let (carried, row) = (engine.grains[grain as usize], engine.rows.get(grain as usize));
-                Some((*flight, carried, row.copied()))
-            }
-        };
-        self.renewals[1 - half].push(Renewal { grain, state });
     }
 
     /// Starts a new epoch for both halves, of the length that one engine would choose.
@@ -380,7 +339,8 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
         both(|| start(first, for_first), || start(second, for_second));
         self.now = 0.0;
         self.sharing.surveyed_until = 0.0;
-        self.renew_copies(0.0);
+        self.prepare_renewal(0.0);
+        renew_found(&self.halves, &mut self.sharing, &mut self.renewals, self.now);
     }
 
     /// Starts the window again and goes on until `until` (s, epoch time) with one engine that has all grains.
@@ -437,6 +397,59 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
     /// Shows all grains at simulated time `time` (s), to which the run has been advanced.
     pub fn snapshot<R>(&self, time: f64, look: impl FnOnce(&Snapshot<'_>) -> R) -> R {
         snapshot_of(time, self.own(), look)
+    }
+}
+
+/// What observers were told.
+#[derive(Clone, Copy, Debug, Default)]
+struct Told {
+    events: u64,
+    collisions: u64,
+    gone: usize,
+}
+
+/// Tells an observer what happened, each event once, in their order.
+fn tell(logs: [&Log; 2], observer: &mut impl Observer) -> Told {
+    let (mut next, mut told) = ([0, 0], Told::default());
+    loop {
+        let heads: [_; 2] = std::array::from_fn(|half| logs[half].events.get(next[half]));
+        let places = heads.map(|head| head.map(Happened::place));
+        let Some(first) = places.iter().flatten().min() else { break told };
+        for half in 0..2 {
+            let Some(event) = heads[half].filter(|_| places[half] == Some(*first)) else { continue };
+            if event.is_ours {
+                let (collisions, gone) = logs[half].tell(next[half], observer);
+                told.events += 1;
+                told.collisions += collisions;
+                told.gone += gone;
+            }
+            next[half] += 1;
+        }
+    }
+}
+
+/// Hands grains over that have crossed the cut, and renews those copies that have to change, as of `now` (s, epoch time).
+fn renew_found<S: Surface, C: Calendar>(
+    halves: &[Half<S, C>; 2],
+    sharing: &mut Sharing,
+    renewals: &mut [Vec<Renewal>; 2],
+    now: f64,
+) {
+    let mut renew = |sharing: &mut Sharing, renewal: &Renewal| {
+        let Renewal { grain, state: Some((flight, ..)) } = renewal else { return };
+        let other = 1 - sharing.owner_of(*grain);
+        if let Some(there_is_one) = sharing.change(*grain, flight, now) {
+            renewals[other].push(Renewal { grain: *grain, state: renewal.state.filter(|_| there_is_one) });
+        }
+    };
+    for renewal in halves.iter().flat_map(|half| &half.log.to_change) {
+        if !sharing.is_wrong(renewal.grain) {
+            renew(sharing, renewal);
+        }
+    }
+    for grain in std::mem::take(&mut sharing.wrong) {
+        let owner = &halves[sharing.owner_of(grain)].engine;
+        renew(sharing, &owner.as_it_is(grain));
     }
 }
 

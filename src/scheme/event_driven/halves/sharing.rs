@@ -275,22 +275,16 @@ impl Sharing {
     pub(super) fn disagreement(&mut self, logs: [&Log; 2]) -> Option<([usize; 2], f64)> {
         let mut next = [0, 0];
         loop {
-            let events: [Option<usize>; 2] = std::array::from_fn(|half| {
-                logs[half]
-                    .shared
-                    .get(next[half])
-                    .map(|&event| event as usize)
-                    .filter(|&event| event < logs[half].events.len())
+            let heads: [Option<&(u32, Happened)>; 2] = std::array::from_fn(|half| {
+                logs[half].shared.get(next[half]).filter(|(number, _)| (*number as usize) < logs[half].events.len())
             });
-            let heads: [Option<&Happened>; 2] =
-                std::array::from_fn(|half| events[half].map(|event| &logs[half].events[event]));
-            let places = heads.map(|head| head.map(Happened::place));
+            let places = heads.map(|head| head.map(|(_, event)| event.place()));
             let first = places.iter().flatten().min().copied()?;
             let seen = places.map(|place| place == Some(first));
             for half in 0..2 {
-                let Some((number, event)) = events[half].zip(heads[half]).filter(|_| seen[half]) else { continue };
+                let Some((number, event)) = heads[half].filter(|_| seen[half]) else { continue };
                 next[half] += 1;
-                if !self.is_agreed(half, logs[half], number, seen[1 - half]) {
+                if !self.is_agreed(half, logs[half], *number as usize, event, seen[1 - half]) {
                     let counts = [0, 1].map(|half| logs[half].count_before(|event| event.place() >= first));
                     return Some((counts, event.time));
                 }
@@ -299,12 +293,12 @@ impl Sharing {
     }
 
     /// Whether the event of this number that `half` saw, and the other half too or not, leaves the grains of both halves as they truly are.
-    fn is_agreed(&mut self, half: usize, log: &Log, number: usize, by_both: bool) -> bool {
-        let event = &log.events[number];
+    fn is_agreed(&mut self, half: usize, log: &Log, number: usize, event: &Happened, by_both: bool) -> bool {
         let ours = |sharing: &Self, grain: u32| sharing.belongs_to(half, grain);
         let is_true = event.grains().all(|grain| ours(self, grain) || self.is_shared(grain));
-        for (grain, flight) in log.flights_of(number) {
+        for (k, grain) in event.grains().enumerate() {
             let ours = ours(self, grain);
+            let flight = || &log.flights[number][k];
             // The other half did not see what happened to its grain, or ours felt what was not so.
             if if is_true { !by_both && !ours } else { ours } {
                 return false;
@@ -314,10 +308,10 @@ impl Sharing {
                     self.known[grain as usize].copy = InOther::Wrong;
                     self.wrong_since[grain as usize] = event.time;
                     self.wrong.push(grain);
-                    self.follow(grain, &flight, event.time);
+                    self.follow(grain, flight(), event.time);
                 }
             } else if ours && self.is_wrong(grain) {
-                self.follow(grain, &flight, event.time);
+                self.follow(grain, flight(), event.time);
             }
         }
         true

@@ -37,16 +37,35 @@ pub(super) fn both<A: Send, B: Send>(first: impl FnOnce() -> A + Send, second: i
 
 /// Does what only one core can do, and keeps the other one awake meanwhile.
 pub(super) fn alone<R>(work: impl FnOnce() -> R) -> R {
-    let ended = AtomicUsize::new(0);
+    beside(work, || {})
+}
+
+/// Does the first here, and the second meanwhile on another core. Whoever is ready first waits awake for the other.
+pub(super) fn beside<R>(here: impl FnOnce() -> R, there: impl FnOnce() + Send) -> R {
+    let (taken, ended) = (AtomicBool::new(false), AtomicUsize::new(0));
+    let wait = || {
+        while ended.load(Ordering::Acquire) < 2 {
+            spin_loop();
+        }
+    };
     rayon::in_place_scope(|scope| {
-        let ended = &ended;
+        let (taken, ended, wait) = (&taken, &ended, &wait);
         scope.spawn(move |_| {
-            while ended.load(Ordering::Acquire) < 1 {
-                spin_loop();
+            taken.store(true, Ordering::Release);
+            {
+                let _end = End(ended);
+                there();
             }
+            wait();
         });
-        let _end = End(ended);
-        work()
+        let result = {
+            let _end = End(ended);
+            here()
+        };
+        if taken.load(Ordering::Acquire) {
+            wait();
+        }
+        result
     })
 }
 
@@ -75,10 +94,12 @@ mod tests {
             let sum = pool(threads).install(|| {
                 (0..1000).fold(0, |sum, number| {
                     let (first, second) = both(|| number, || 2 * number);
-                    sum + alone(|| first + second)
+                    let mut third = 0;
+                    let both = beside(|| first + second, || third = number);
+                    sum + alone(|| both + third)
                 })
             });
-            assert_eq!(sum, 3 * 999 * 1000 / 2);
+            assert_eq!(sum, 4 * 999 * 1000 / 2);
         }
     }
 
@@ -91,6 +112,7 @@ mod tests {
                     assert!(catch_unwind(|| both(|| fail(!late), || fail(late))).is_err());
                 }
                 assert!(catch_unwind(AssertUnwindSafe(|| alone(|| panic!("as it should")))).is_err());
+                assert!(catch_unwind(|| beside(|| {}, || panic!("as it should"))).is_err());
             });
         }
     }

@@ -4,9 +4,9 @@ use impinge_events::calendar::Calendar;
 use impinge_events::{Flight, Surface};
 use rustc_hash::FxHashMap;
 
-use super::EventDriven;
 use super::log::{Carried, Happened, Log};
 use super::sharing::Sharing;
+use super::{EventDriven, Renewal};
 use crate::scene::Interference;
 use crate::scheme::Broken;
 
@@ -23,10 +23,13 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         self.encounters.forget_crossings();
         while let Some((time, encounter)) = self.next_before(until) {
             self.encounters.soon().iter().for_each(|&grain| sharing.fetch(grain));
-            let event = Happened { time, encounter, told: log.records.len() as u32 };
+            let mut event = Happened::new(time, encounter, log.records.len());
             let number = log.events.len() as u32;
+            let mut belong = event.grains().map(|grain| sharing.belongs_to(half, grain));
+            // What happens across the cut the first half tells.
+            event.is_ours = if half == 0 { belong.any(|ours| ours) } else { belong.all(|ours| ours) };
             if event.grains().any(|grain| sharing.is_shared(grain)) {
-                log.shared.push(number);
+                log.shared.push((number, event));
             }
             log.events.push(event);
             log.flights.push(self.encounters.before());
@@ -54,13 +57,20 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         Ok(())
     }
 
-    /// Finds the grains of this half whose copies have to change at `now` (s, epoch time).
+    /// Finds the grains of this half whose copies have to change at `now` (s, epoch time), and what they become.
     pub(super) fn find_changes(&self, half: usize, now: f64, sharing: &Sharing, log: &mut Log) {
         let has_to_change = |&grain: &u32| {
             sharing.belongs_to(half, grain) && sharing.has_to_change(half, grain, self.encounters.flight(grain), now)
         };
+        let watched = sharing.watched[half].iter().chain(&log.to_watch).copied();
         log.to_change.clear();
-        log.to_change.extend(sharing.watched[half].iter().chain(&log.to_watch).copied().filter(has_to_change));
+        log.to_change.extend(watched.filter(has_to_change).map(|grain| self.as_it_is(grain)));
+    }
+
+    /// What a copy of a grain becomes if it is made like this one.
+    pub(super) fn as_it_is(&self, grain: u32) -> Renewal {
+        let (flight, row) = (*self.encounters.flight(grain), self.rows.get(grain as usize).copied());
+        Renewal { grain, state: Some((flight, self.grains[grain as usize], row)) }
     }
 
     /// Undoes the events of `log` from number `first` on, and goes back to `now` (s, epoch time), before them.
