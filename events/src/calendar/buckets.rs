@@ -21,15 +21,17 @@ const PARTS_OF_TURN: i64 = 16;
 const FEWEST_IN_A_CROWD: usize = 256;
 /// Buckets are no narrower than this part of what the median of the waiting times would make them: or a turn of them would be too short.
 const NARROWEST: f64 = 1.0 / 64.0;
-/// So many buckets before theirs it is said who comes; about as many events come until then.
-const ANNOUNCED: i64 = 8;
+/// So many events before theirs it is said who comes, as many as came in the buckets of late, ...
+const EVENTS_ANNOUNCED: i64 = 8;
+/// ... but so many buckets before at the least, and at the most.
+const ANNOUNCED: [i64; 2] = [8, 24];
 /// So many buckets before that the owners in each are fetched from memory.
 const FETCHED: i64 = 8;
 /// From so many buckets on their lists do not fit the nearest caches: an owner enters one that is at least so many ahead only after some others, once the list
 /// has come from memory.
 const MANY: usize = 1 << 14;
 const FAR: i64 = 64;
-const _: () = assert!(FAR / 2 > ANNOUNCED);
+const _: () = assert!(FAR / 2 > ANNOUNCED[1]);
 /// At most so many waiting times, and at least half of that where there are more, tell the median of all.
 const SAMPLED: usize = 1 << 10;
 /// The buckets are laid out anew when more entries than so many times their number wait: most of them are of events that are no longer.
@@ -66,6 +68,8 @@ pub struct Buckets {
     part: (i64, usize),
     /// The bucket up to which it was said who comes.
     announced: i64,
+    /// So many buckets before theirs it is said.
+    ahead: i64,
     /// Owners that are yet to enter their lists.
     staging: Staging,
 }
@@ -137,6 +141,7 @@ impl Default for Buckets {
             passed_before: 0,
             part: (0, 0),
             announced: 0,
+            ahead: ANNOUNCED[0],
             staging: Staging::default(),
         }
     }
@@ -241,6 +246,8 @@ impl Buckets {
     /// Starts the turn in which the next event is. Nobody waits but for later turns; tells whether there is anybody.
     #[cold]
     fn start_turn(&mut self) -> bool {
+        let buckets_of_events = EVENTS_ANNOUNCED * self.buckets() / self.passed.max(1) as i64;
+        self.ahead = buckets_of_events.clamp(ANNOUNCED[0], ANNOUNCED[1]);
         self.passed_before += self.passed;
         let few = (self.passed as f64) < FEWEST_EVENTS * self.buckets() as f64;
         // To lay out costs as much as that many events, however few there are in a turn.
@@ -296,7 +303,7 @@ impl Buckets {
         let coarse = usize::from(count > MOST_FINE);
         self.lists.reset((BUCKETS_PER_EVENT * count).next_power_of_two() >> coarse);
         self.present.clear();
-        (self.now, self.turn, self.announced) = (0, 0, 0);
+        (self.now, self.turn, self.announced, self.ahead) = (0, 0, 0, ANNOUNCED[0]);
         (self.waiting, self.passed, self.passed_before, self.part) = (0, 0, 0, (0, 0));
         self.staging = Staging::default();
         for owner in 0..self.owners.len() as u32 {
@@ -365,7 +372,7 @@ impl Calendar for Buckets {
         self.owners.iter_mut().for_each(|owner| owner.event = never(Kind::Exit));
         self.lists.reset(1);
         self.present.clear();
-        (self.now, self.turn, self.announced) = (0, 0, 0);
+        (self.now, self.turn, self.announced, self.ahead) = (0, 0, 0, ANNOUNCED[0]);
         (self.waiting, self.passed, self.passed_before, self.part) = (0, 0, 0, (0, 0));
         self.staging = Staging::default();
         self.rate = 0.0;
@@ -373,7 +380,7 @@ impl Calendar for Buckets {
 
     fn coming(&mut self, owners: &mut Vec<u32>) {
         let buckets = self.buckets();
-        let last = self.now.saturating_add(ANNOUNCED).min(self.turn + (buckets - 1));
+        let last = self.now.saturating_add(self.ahead).min(self.turn + (buckets - 1));
         self.announced = self.announced.max(self.now);
         while self.announced < last {
             self.announced += 1;
@@ -565,6 +572,31 @@ mod tests {
             let earlier = event(400.0 + 0.01 * f64::from(step));
             calendar.schedule(500, earlier);
             assert_eq!(calendar.next(), Some((500, earlier)));
+        }
+        assert_eq!(calendar.rate, rate);
+    }
+
+    /// Where a gas cools its events become few in a bucket, and who comes was said too late for the memory.
+    #[test]
+    fn who_came_was_said_too_late_where_events_became_few() {
+        let mut calendar = Buckets::default();
+        let event = |time| Event { time, kind: Kind::Grains, partner: 0 };
+        (0..1024).for_each(|owner| calendar.schedule(owner, event(f64::from(owner))));
+        assert_eq!(calendar.next(), Some((0, event(0.0))));
+        let rate = calendar.rate;
+        let (mut said, mut now) = (vec![None; 1024], 0.0);
+        while now < 4000.0 {
+            let mut coming = Vec::new();
+            calendar.coming(&mut coming);
+            coming.iter().for_each(|&owner| said[owner as usize] = Some(now));
+            let (owner, first) = calendar.next().expect("all wait");
+            now = first.time;
+            // From the second turn on a third as many.
+            calendar.schedule(owner, event(if now < 1024.0 { 1024.0 + 3.0 * now } else { now + 3072.0 }));
+            if now > 3200.0 {
+                let early = said[owner as usize].map_or(0.0, |then| now - then);
+                assert!(early > f64::from(ANNOUNCED[1] as i32 - 4), "{early} s before {now} s");
+            }
         }
         assert_eq!(calendar.rate, rate);
     }
