@@ -96,6 +96,8 @@ pub(super) struct Log {
     pub(super) to_watch: Vec<u32>,
     /// What the copies become that the other half has of grains of this one, where they have to change: as these fly now.
     pub(super) to_change: Vec<Renewal>,
+    /// The moment (s, epoch time) for which these were found, unless something was undone since.
+    pub(super) found_for: Option<f64>,
     /// Largest speed towards the cut that a grain got, m/s.
     pub(super) fastest: f64,
     /// Whether a grain became too fast for the epoch.

@@ -246,7 +246,7 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
             self.events[half] += log.events.len();
             self.sharing.watch(half, &log.to_watch);
         }
-        self.prepare_renewal(until);
+        self.prepare_renewal();
         self.tell_and_renew(observer);
         if self.now < until {
             self.windows.cut_short += 1;
@@ -311,13 +311,13 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
         self.sharing.watch_only([&ours, &theirs]);
     }
 
-    /// Looks at all grains if it is time, and finds out whose copies have to change, unless that was found for this very moment (s, epoch time).
-    fn prepare_renewal(&mut self, found_for: f64) {
+    /// Looks at all grains if it is time, and finds out whose copies have to change, unless that was found for this very moment.
+    fn prepare_renewal(&mut self) {
         let is_time = self.now >= self.sharing.surveyed_until;
         if is_time {
             self.survey();
         }
-        if is_time || self.now < found_for {
+        if is_time || self.halves.iter().any(|half| half.log.found_for != Some(self.now)) {
             let ([first, second], sharing, now) = (&mut self.halves, &self.sharing, self.now);
             let find = |half, Half { engine, log }: &mut Half<S, C>| engine.find_changes(half, now, sharing, log);
             both(|| find(0, first), || find(1, second));
@@ -339,7 +339,7 @@ impl<S: Surface + Clone + Send + Sync, C: Calendar + Clone + Send + Sync> Halves
         both(|| start(first, for_first), || start(second, for_second));
         self.now = 0.0;
         self.sharing.surveyed_until = 0.0;
-        self.prepare_renewal(0.0);
+        self.prepare_renewal();
         renew_found(&self.halves, &mut self.sharing, &mut self.renewals, self.now);
     }
 

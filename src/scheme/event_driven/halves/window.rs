@@ -63,6 +63,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
             sharing.belongs_to(half, grain) && sharing.has_to_change(half, grain, self.encounters.flight(grain), now)
         };
         let watched = sharing.watched[half].iter().chain(&log.to_watch).copied();
+        log.found_for = Some(now);
         log.to_change.clear();
         log.to_change.extend(watched.filter(has_to_change).map(|grain| self.as_it_is(grain)));
     }
@@ -101,6 +102,7 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
         log.events.truncate(first);
         log.flights.truncate(first);
         log.rows.truncate(first);
+        log.found_for = None;
         self.outrun = false;
         (self.mark, self.since_mark) = (now, 0);
     }
@@ -121,5 +123,40 @@ impl<S: Surface, C: Calendar> EventDriven<S, C> {
     pub(super) fn is_stopped_by_surface(&self, grain: u32) -> bool {
         let once = matches!(self.laws.interference, Interference::FirstOrder | Interference::RemovedOnFirstCollision);
         !once || self.grains[grain as usize].hits == 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use impinge_events::{Domain, NoSurface};
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::grains::NewGrain;
+    use crate::law::{ContactLaw, Friction};
+    use crate::scheme::{Collapse, Laws};
+
+    /// An event at the very end of a window was undone, and copies got the states that had been found after it.
+    #[test]
+    fn what_was_found_before_an_event_was_undone_is_not_used() -> Result<(), Broken> {
+        let ball = |x: f64, vx: f64| NewGrain {
+            position: Vector3::x() * x,
+            velocity: Vector3::x() * vx,
+            spin: Vector3::zeros(),
+            radius: 0.5,
+            density: 1.0,
+            strength: 1.0,
+        };
+        let law = ContactLaw { restitution: 1.0, friction: Friction::Smooth };
+        let laws = Laws { grain: law, surface: law, interference: Interference::All, collapse: Collapse::Elastic };
+        let balls = [ball(0.0, 1.0), ball(3.0, 0.0)];
+        let mut engine: EventDriven<NoSurface> = EventDriven::new(&balls, NoSurface, Domain::unbounded(), laws, 0.0);
+        let (sharing, mut log) = (Sharing::of(&engine, 0.0), Log::default());
+        engine.run_window(0, 2.0, &sharing, &mut log)?;
+        engine.find_changes(0, 2.0, &sharing, &mut log);
+        assert_eq!((log.events.len(), log.found_for), (1, Some(2.0)));
+        engine.undo(&mut log, 0, 2.0);
+        assert_eq!((log.events.len(), log.found_for), (0, None));
+        Ok(())
     }
 }
