@@ -5,34 +5,17 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Does both at once in the thread pool of rayon. Whoever is ready first waits awake for the other.
 pub(super) fn both<A: Send, B: Send>(first: impl FnOnce() -> A + Send, second: impl FnOnce() -> B + Send) -> (A, B) {
-    let (taken, ended) = (AtomicBool::new(false), AtomicUsize::new(0));
-    let wait = || {
-        while ended.load(Ordering::Acquire) < 2 {
-            spin_loop();
-        }
-    };
-    rayon::join(
-        || {
-            let result = {
-                let _end = End(&ended);
-                first()
-            };
-            // Where no other core was free this one does both, one after the other.
-            if taken.load(Ordering::Acquire) {
-                wait();
-            }
-            result
-        },
-        || {
-            taken.store(true, Ordering::Release);
-            let result = {
-                let _end = End(&ended);
-                second()
-            };
-            wait();
-            result
-        },
-    )
+    let pair = Pair::default();
+    rayon::join(|| pair.here(first), || pair.there(second))
+}
+
+/// The same, where the first has to stay in this thread.
+pub(super) fn beside<R>(here: impl FnOnce() -> R, there: impl FnOnce() + Send) -> R {
+    let pair = Pair::default();
+    rayon::in_place_scope(|scope| {
+        scope.spawn(|_| pair.there(there));
+        pair.here(here)
+    })
 }
 
 /// Does what only one core can do, and keeps the other one awake meanwhile.
@@ -40,33 +23,44 @@ pub(super) fn alone<R>(work: impl FnOnce() -> R) -> R {
     beside(work, || {})
 }
 
-/// Does the first here, and the second meanwhile on another core. Whoever is ready first waits awake for the other.
-pub(super) fn beside<R>(here: impl FnOnce() -> R, there: impl FnOnce() + Send) -> R {
-    let (taken, ended) = (AtomicBool::new(false), AtomicUsize::new(0));
-    let wait = || {
-        while ended.load(Ordering::Acquire) < 2 {
-            spin_loop();
-        }
-    };
-    rayon::in_place_scope(|scope| {
-        let (taken, ended, wait) = (&taken, &ended, &wait);
-        scope.spawn(move |_| {
-            taken.store(true, Ordering::Release);
-            {
-                let _end = End(ended);
-                there();
-            }
-            wait();
-        });
-        let result = {
-            let _end = End(ended);
-            here()
-        };
-        if taken.load(Ordering::Acquire) {
-            wait();
+/// How far two have come that work at once.
+#[derive(Default)]
+struct Pair {
+    /// Whether another core has taken the second part.
+    taken: AtomicBool,
+    /// How many parts have ended.
+    ended: AtomicUsize,
+}
+
+impl Pair {
+    /// The part of the core that began.
+    fn here<R>(&self, work: impl FnOnce() -> R) -> R {
+        let result = self.work(work);
+        // Where no other core was free this one does both, one after the other.
+        if self.taken.load(Ordering::Acquire) {
+            self.wait();
         }
         result
-    })
+    }
+
+    /// The part that another core takes if one is free.
+    fn there<R>(&self, work: impl FnOnce() -> R) -> R {
+        self.taken.store(true, Ordering::Release);
+        let result = self.work(work);
+        self.wait();
+        result
+    }
+
+    fn work<R>(&self, work: impl FnOnce() -> R) -> R {
+        let _end = End(&self.ended);
+        work()
+    }
+
+    fn wait(&self) {
+        while self.ended.load(Ordering::Acquire) < 2 {
+            spin_loop();
+        }
+    }
 }
 
 /// Notes that something has ended, also where it panics: nobody waits for it without end.
